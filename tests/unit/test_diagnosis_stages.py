@@ -1759,9 +1759,7 @@ def test_what_goes_on_long_after_the_beginning_is_searched_without_a_free_one(
     monkeypatch.setattr(settling, "HeldOut", lambda problem: HeldOut())
     monkeypatch.setattr(settling, "is_held", lambda *_: held)
     drift = Fit(left, (_term("offset-drift"),), _without={"offset-drift": rest})
-    monkeypatch.setattr(settling.search, "stage", lambda state: replace(state, current=drift))
-    for module in (settling.restart, settling.exchange, settling.elimination):
-        monkeypatch.setattr(module, "stage", lambda state: state)
+    monkeypatch.setattr(settling.whole_search, "stage", lambda state: replace(state, current=drift))
     monkeypatch.setattr(Fit, "without", lambda self, term: rest)
     before = _state(current, p_values={"delay": 0.003})
     after = settling.stage(before)

@@ -10,7 +10,7 @@ from functools import cache
 
 from pulsetrainer.artefacts import Cause as Found
 from pulsetrainer.artefacts import Extension
-from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
 from pulsetrainer.errors import DataError
 
 
@@ -24,6 +24,13 @@ def library() -> dict[str, Cause]:
             if issubclass(kind, Cause) and hasattr(kind, "id") and kind.__module__ == loaded.__name__:
                 found.append(kind())
     return {cause.id: cause for cause in sorted(found, key=lambda c: c.order)}
+
+
+def other_kinds(cause: Cause, frame: Frame) -> list[Cause]:
+    """Return the other kinds of a cause that have as many parameters: a finer formula begins elsewhere."""
+    known = library()[cause.id].kinds() if cause.id in library() else ()
+    count = len(cause.quantities(frame))
+    return [one for one in known if one is not cause and len(one.quantities(frame)) == count]
 
 
 def cause_named(name: str) -> Cause:

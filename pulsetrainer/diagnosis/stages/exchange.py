@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
@@ -62,15 +62,14 @@ def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
 
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
-    frame = problem.frames[0]
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
-    kinds = [one for one in library()[cause.id].kinds() if one is not cause] if cause.id in library() else []
+    kinds = other_kinds(cause, problem.frames[0])
     if not kin and not kinds:
         return state
     # by its cause: an exchange before this one has moved all terms
     term = next(term for term in current.terms if term.cause is cause)
     without = current.without(term)
-    others = [Term(kind, term.values) for kind in kinds if len(kind.quantities(frame)) == len(term.values)]
+    others = [Term(kind, term.values) for kind in kinds]
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]

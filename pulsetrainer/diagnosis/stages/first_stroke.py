@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.initial_state import known_from, left_out_words, second_stroke
-from pulsetrainer.diagnosis.stages import baseline, elimination, exchange, raw_data, restart, search
+from pulsetrainer.diagnosis.stages import baseline, raw_data, whole_search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -54,10 +54,7 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
     if not notes:
         return None
     question = replace(state.question, records=records, notes=(*state.question.notes, *notes))
-    again = baseline.stage(raw_data.stage(question))
-    for one in (search, restart, exchange, elimination):
-        again = one.stage(again)
-    return again
+    return whole_search.stage(baseline.stage(raw_data.stage(question)))
 
 
 def _called(state: State, k: int) -> str:

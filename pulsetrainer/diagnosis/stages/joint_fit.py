@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
@@ -46,9 +46,7 @@ def _of_best_kind(state: State, score: Score) -> Fitted:
     """Refit with the kind of a cause that fits best: linearised they can hardly be told apart."""
     best = _with(state, score.cause, score.start)
     values = best.terms[best.names.index(score.cause.id)].values
-    frame = state.problem.frames[0]
-    others = [one for one in library()[score.cause.id].kinds() if one is not score.cause]
-    others = [one for one in others if len(one.quantities(frame)) == len(values)]  # a finer one: `exchange`
+    others = other_kinds(score.cause, state.problem.frames[0])
     return min([best, *(_with(state, kind, values) for kind in others)], key=lambda fitted: fitted.squares)
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.stages import elimination, exchange, restart, search
+from pulsetrainer.diagnosis.stages import whole_search
 from pulsetrainer.diagnosis.stages.begin import begins_at_rest, late
 from pulsetrainer.diagnosis.stages.repetition import SLOW, is_held, may_be_held
 from pulsetrainer.diagnosis.state import State
@@ -33,8 +33,7 @@ def stage(state: State) -> State:
     again = replace(
         state, problem=at_rest, baseline=plain, current=plain, held_out=HeldOut(at_rest), p_values={}
     )
-    for one in (search, restart, exchange, elimination):
-        again = one.stage(again)
+    again = whole_search.stage(again)
     worse = again.current.squares - state.current.squares > state.floor.relevant
     held = [term for term in again.current.terms if may_be_held(term) and _is_held(again, term)]
     return state if worse or held else again
