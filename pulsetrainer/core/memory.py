@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pulsetrainer.core.branches import pieces
 from pulsetrainer.core.plane import FloatArray, IntArray, ascending, float_array
 from pulsetrainer.errors import ArgumentError
 
@@ -125,8 +126,7 @@ def trace(values: FloatArray, start: State, low: float, high: float) -> Trace:
 def trace_after(past: FloatArray, values: FloatArray, low: float, high: float) -> Trace:
     """Follow an input (n,), clipped to [low, high], after a ``past`` (p,) that begins with all relays down.
 
-    The memory is the alternating sequence of dominant extremes (Mayergoyz 2003, section 1.2). One pass
-    over the turning points, each of which is pushed and wiped out at most once: linear in n + p. ``past``
+    The memory is the alternating sequence of dominant extremes (Mayergoyz 2003, section 1.2). ``past``
     and ``values`` are finite and not empty, in the unit of ``low`` and ``high``; nothing is checked here.
     """
     path = np.concatenate((past, values))
@@ -134,52 +134,46 @@ def trace_after(past: FloatArray, values: FloatArray, low: float, high: float) -
     path[0] = low  # whatever plane the past came from, it begins with every relay down
     turns = turning_points(path)
     turn_value = path[turns]
-    # the remembered turning points, their numbers and values, above a value that no input passes
-    stack, height = [-1, 0], [np.inf, low]
-    anchors: list[int] = []  # of each piece of a branch; one more piece begins at each wiping-out
-    pieces: list[int] = []  # number of pieces up to the end of each branch
-    count, rising = 0, True
-    for value in turn_value.tolist():
-        # wiping-out: pass the older extremes of the same kind, the nearest first
-        while (value >= height[-2]) if rising else (value <= height[-2]):
-            anchors.append(stack.pop())
-            height.pop()
-            if len(stack) == 2:  # all relays are down again
-                break
-            stack.pop()
-            height.pop()
-        anchors.append(stack[-1])
-        pieces.append(len(anchors))
-        if value != height[-1]:
-            count += 1
-            stack.append(count)
-            height.append(value)
-        rising = not rising
-    anchor = np.fromiter(anchors, np.int64, len(anchors))
-    last = np.fromiter(pieces, np.int64, len(pieces)) - 1  # piece of each branch that reaches the turn
+    anchor, last = pieces(np.append(low, turn_value))
     pushed = turn_value != low
     node_value = np.append(low, turn_value[pushed])
+    node = np.append(0, np.where(pushed, np.cumsum(pushed), 0))  # of each turn
+    anchor = node[anchor]
     parent = np.append(0, anchor[last[pushed]])
     level = node_value[parent[anchor]]  # that ends a piece: the extreme before its anchor is passed
-    level[last] = np.where(np.arange(last.size) % 2 == 0, np.inf, -np.inf)
     ends = _piece_ends(path, turns, level, last)
     length = np.diff(np.concatenate(([1], ends, [path.size])))  # at last, samples that rest
-    of_sample = np.repeat(np.append(anchor, stack[-1]), length)[past.size - 1 :]
-    return Trace(path[past.size :], of_sample, node_value, parent, State(tuple(height[1:])))
+    of_sample = np.repeat(np.append(anchor, node[-1]), length)[past.size - 1 :]
+    return Trace(path[past.size :], of_sample, node_value, parent, _state(int(node[-1]), node_value, parent))
+
+
+def _state(node: int, node_value: FloatArray, parent: IntArray) -> State:
+    """Return what is remembered at a turning point."""
+    chain = [node]
+    while chain[-1] > 0:
+        chain.append(int(parent[chain[-1]]))
+    return State(tuple(node_value[chain[::-1]].tolist()))
 
 
 def _piece_ends(path: FloatArray, turns: IntArray, level: FloatArray, last: IntArray) -> IntArray:
     """Index into ``path`` of the first sample, on each piece's branch, that has reached its ``level``.
 
-    Branches are monotone, the even ones rising: bisection of all pieces at once.
+    Branches are monotone, the even ones rising: bisection of all pieces at once. The last ends at the turn.
     """
     branch = np.repeat(np.arange(turns.size), np.diff(last, prepend=-1))
-    begin = np.concatenate(([1], turns + 1))[branch]
-    end = turns[branch] + 1
-    direction = np.where(branch % 2 == 0, 1.0, -1.0)
-    level = direction * level
-    while np.any(begin < end):
+    ends = turns[branch] + 1
+    inner = np.ones(branch.size, dtype=bool)
+    inner[last] = False
+    piece = np.flatnonzero(inner)
+    begin, end = np.concatenate(([1], turns + 1))[branch[piece]], ends[piece]
+    direction = np.where(branch[piece] % 2 == 0, 1.0, -1.0)
+    level = direction * level[piece]
+    while piece.size > 0:
         middle = (begin + end) // 2
-        reached = direction * path[np.minimum(middle, path.size - 1)] >= level
-        begin, end = np.where(reached, (begin, middle), (np.minimum(middle + 1, end), end))
-    return end
+        reached = direction * path[middle] >= level
+        begin, end = np.where(reached, begin, middle + 1), np.where(reached, middle, end)
+        ends[piece] = end
+        still = begin < end
+        piece, begin, end = piece[still], begin[still], end[still]
+        direction, level = direction[still], level[still]
+    return ends
