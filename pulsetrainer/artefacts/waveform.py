@@ -1,4 +1,4 @@
-"""A waveform: a target, the two drives that shall press it, and the error that the model expects of them."""
+"""A waveform: a target, the two drives that are to press it, and the error that the model expects of them."""
 
 from __future__ import annotations
 
