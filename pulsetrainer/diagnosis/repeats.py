@@ -1,4 +1,4 @@
-"""Whether a cause repeats: does it predict whole pieces of time that were left out of the fit?"""
+"""Whether a cause repeats, that is, predicts whole pieces of time that were left out of the fit."""
 
 from __future__ import annotations
 
