@@ -26,8 +26,7 @@ prints it. The nouns (`artefacts`) are frozen dataclasses that know no file. The
 
 ## Who imports whom
 
-An arrow points from a part to a part that it imports. An arrow that follows from others is left out: where `a` imports
-`b` and `b` imports `c`, `a` may import `c`.
+An arrow points from a part to a part that it imports. An arrow that follows from others is left out; the table has all.
 
 ```mermaid
 {drawing}
@@ -45,7 +44,8 @@ Checked by `make lint` (`lint-imports`; the contracts are in `pyproject.toml`):
 
 Held by `tests/unit/test_house_rules.py`: outside `cli` nothing prints or exits; random numbers come from a generator that
 is passed in or has a fixed seed; the core and the diagnosis read no clock and no environment. Errors are one family
-(`pulsetrainer/errors.py`), and `pulsetrainer/cli/guard.py` turns those that are raised into exit codes.
+(`pulsetrainer/errors.py`). `pulsetrainer/cli/guard.py` turns those that are raised into exit codes; a failed quality gate
+exits in `pulsetrainer/cli/console.py`, after its result was shown.
 
 The firmware in `firmware/` is C99 without a heap: `core` (protocol, control, safety; no hardware), `hal` (what a port must
 offer), `port` (the host's pseudo-terminal, an emulated Cortex-M4F, the dsPIC33), `plant` (the simulated solenoid).
@@ -53,6 +53,7 @@ offer), `port` (the host's pseudo-terminal, an emulated Cortex-M4F, the dsPIC33)
 
 The pages are made by scripts in `docs/`: `make.py` writes all that come from the code, with `architecture.py` (this page),
 `verdict.py` (how a verdict is reached) and `api_reference.py` (the Python API); `site.py` gathers them for the site.
+`docs/decisions`, `docs/how-to`, `docs/theory.md` and `docs/blind.md` are written by hand.
 
 ## Where to find what
 
@@ -63,6 +64,19 @@ The pages are made by scripts in `docs/`: `make.py` writes all that come from th
 ### waveforms
 
 The pulses, as CSV files that [make.py](waveforms/make.py) writes from their formulas.
+
+### tests
+
+- `unit`: one module at a time. The rules above are in `test_house_rules.py`.
+- `law`: equations that hold for any input, tried by Hypothesis; `tests/oracle.py` has slow, obvious twins of fast routines.
+- `cli`, `api`: commands as a user types them, and the Python API. The words of every error message, with what to do next, are
+  in one table, `tests/wording.py`; a line for each command is in `tests/command_lines.py`.
+- `firmware`, `link`: the firmware in C, and the host talking to it; what may not happen to a finger: `link/test_safety.py`.
+- `blind`: how often the diagnosis is right about effects that are hidden from it.
+- `faults`, `mutation`: kills, full disks and damaged files; small faults put into the code, to see which tests notice.
+- `docs`, `browser`, `workflow`: what the pages promise, the reports in a browser, batches.
+- `regression`: the demo's figures against `bounds.toml`.
+- `data`: measured records of others, with [their sources](tests/data/SOURCES.md).
 """
 
 

@@ -395,7 +395,7 @@ DECISIONS = """\
 
 {mark}
 
-Ten lines each: what was decided, why, and what else was tried.
+A page each: what was decided, why, and what else was tried.
 
 """
 

@@ -41,7 +41,7 @@ def load(path: Path | str) -> Any:
     Raises
     ------
     DataError
-        The file is absent, damaged, no artefact, or of a newer format.
+        The file is absent, damaged, not an artefact, or of a newer format.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def save(
     Raises
     ------
     ArgumentError
-        It is no artefact.
+        It is not an artefact.
     UsageError
         The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
     DataError
@@ -210,7 +210,7 @@ def read_table(
     input_unit, output_unit
         Where the headings do not say them.
     rate_Hz, no_time
-        In the place of a column of time: samples a second, or only the order of the samples.
+        Instead of a column of time: samples per second, or only the order of the samples.
     resample
         Makes the time steps even: at a rate, Hz, or at the median step, "even".
     skip_bad_rows

@@ -1,4 +1,4 @@
-"""Captures and sessions into a file while they are measured: what is recorded survives the program."""
+"""Captures and sessions, written to a file while they are measured: the data survive if the program dies."""
 
 from __future__ import annotations
 

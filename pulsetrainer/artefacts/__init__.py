@@ -1,4 +1,4 @@
-"""The nouns: one frozen dataclass a kind of artefact. They know no file."""
+"""The nouns: one frozen dataclass for each kind of artefact. They know no file."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class Model(Shown):
     """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro 2018, eq. 2).
 
     ``form`` says what the weights are of: "direct", y = P[u] with mu >= 0; "dual", u = P[y] with mu >= 0,
-    where edges are of the output and the offset is of the input; "signed", y = P[u] with mu of either sign.
+    with edges of the output and an offset of the input; "signed", y = P[u] with mu of either sign.
 
     Examples
     --------
@@ -174,7 +174,7 @@ class Model(Shown):
 
     @property
     def edges_quantity(self) -> str:
-        """Quantity of the edges: the input's, of a dual model the output's."""
+        """Quantity of the edges: the input's; in a dual model, the output's."""
         return self.output_quantity if self.form == "dual" else self.input_quantity
 
     @property
@@ -192,7 +192,7 @@ class Model(Shown):
         DataError
             The model has extensions, which depend on time, and ``dt_s`` is not given.
         ArgumentError
-            The input is no row of finite numbers.
+            The input is not a row of finite numbers.
 
         Examples
         --------

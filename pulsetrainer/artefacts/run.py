@@ -125,7 +125,7 @@ class Run(Shown):
         return replace(self, seam=None, **{name: getattr(self, name)[part] for name in arrays})
 
     def parts(self, at_least: int = 1) -> tuple[Run, ...]:
-        """Return the uninterrupted parts of ``at_least`` so many samples; the run itself where there is none.
+        """Return the uninterrupted parts of ``at_least`` samples or more; the run itself where there is none.
 
         Before a seam the device was off, so what is slow in it (heat, creep) does not continue across it.
         Each such part begins at the low end of the input, so that its memory is known; after an unseen turn

@@ -1,4 +1,4 @@
-"""Units: which texts are one, how a heading says one, how many seconds one is, and how one is printed.
+"""Units: which texts are units, which prefixes they take, how a heading gives one, how one is printed.
 
     unit   = "1" | factor { ("*" | "." | "·" | " " | "/") factor }
     factor = [prefix] symbol [["^"] exponent] | "1"

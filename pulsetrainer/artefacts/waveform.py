@@ -1,4 +1,4 @@
-"""A waveform: a target, the two drives that shall press it, and the error that the model expects of them."""
+"""A waveform: a target, the two drives that are to press it, and the error that the model expects of them."""
 
 from __future__ import annotations
 
@@ -72,12 +72,12 @@ class Waveform(Shown):
 
     @property
     def rate_Hz(self) -> float:
-        """Samples a second."""
+        """Samples per second."""
         return 1.0 / float(np.median(np.diff(self.time_s)))
 
     @property
     def full_force(self) -> float:
-        """Largest absolute target that is scored, output unit: what errors are given in percent of."""
+        """Largest absolute target that is scored, output unit: errors are percentages of it."""
         return float(np.abs(self.target[self.scored]).max())
 
     @property

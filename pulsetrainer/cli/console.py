@@ -1,4 +1,4 @@
-"""What a command shows: results on stdout, progress and notes on stderr, bars only on a terminal."""
+"""What a command shows, on stdout, stderr and terminal; and its exit when a quality gate failed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hands on a session: joins the screen (``cli.live``) with what its keys change, or answer in a quiz."""
+"""Keys of a session: joins the screen (``cli.live``) to what the keys change, or answer in a quiz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Help that fits the terminal: its lines are folded between words, also where the terminal is narrow."""
+"""Help that fits the terminal: lines are folded between words, on a narrow terminal too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a command may write: nothing over its own inputs, and under a name that says what it gets."""
+"""What a command may write: never over its own inputs, and under a name that says what the file holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The file of settings as the parser takes it: by command and option."""
+"""The settings file as the parser takes it: by command and option."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Censored outputs: a reading in coarse steps, or at a rail, tells an interval; the best hysteresis the rest.
+"""Censored outputs: a reading in coarse steps, or at a rail, gives an interval; a fit does the rest.
 
 A sample of a coarse converter that reads c was anywhere in c - q/2 .. c + q/2, one that is cut off at a rail
 anywhere beyond it. With noise s and a fitted output p the likelihood of an interval a .. b is

@@ -1,4 +1,4 @@
-"""How long a residual remembers itself."""
+"""How long a residual stays correlated with itself."""
 
 from __future__ import annotations
 

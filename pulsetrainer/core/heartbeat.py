@@ -1,4 +1,4 @@
-"""Single beats of a pulse, drawn at any length: what a session is put together of.
+"""Single beats of a pulse, drawn at any length: what a session is put together from.
 
 A shorter interval takes most from diastole. With T0 the beat's own interval and T the one asked for,
 time runs in the beat as

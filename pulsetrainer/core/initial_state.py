@@ -1,4 +1,4 @@
-"""The state before a record: from which sample on it does not matter, which one is assumed, or estimated.
+"""The state before a record: how it is assumed or estimated, and from which sample it no longer matters.
 
 A fit leaves out what comes before the memory is known (``record_of``). A prediction of a record that never
 makes the memory known tries several states and takes the one that predicts best (``estimated_start``).

@@ -1,4 +1,4 @@
-"""Which way a loop runs, read off the major loop of a fitted operator; in words it is in ``report.facts``."""
+"""Which way a loop runs, from the major loop of a fitted operator; ``report.facts`` puts it in words."""
 
 from __future__ import annotations
 

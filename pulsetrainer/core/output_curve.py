@@ -1,4 +1,4 @@
-"""A curve of the output over a hysteretic quantity, y = f(P[u]), held against weights of either sign.
+"""A curve of the output over a hysteretic quantity, y = f(P[u]), compared with weights of either sign.
 
 What a swing of the input adds to the output of a Preisach operator, of whatever sign, depends on the swing
 alone and not on where the output stands: its minor loops between the same limits are congruent (Mayergoyz,

@@ -1,4 +1,4 @@
-"""The coil's temperature, told by the duty that its current needs: copper resists 0.39 % more a kelvin.
+"""The coil's temperature, told by the duty that its current needs: copper resists 0.39 % more per kelvin.
 
 Over a window of a second the duty of the current loop is
 

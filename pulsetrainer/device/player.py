@@ -1,4 +1,4 @@
-"""One play: upload by credit, start, keep the buffer filled and the device convinced that we live.
+"""One play: upload by credit, start, keep the buffer filled, and show the device that the host is alive.
 
 Runs in a thread of its own, so that a slow disk under the telemetry never starves a device that
 switches off after 200 ms of silence. The thread vouches for the whole program, though: when nobody

@@ -1,4 +1,4 @@
-"""What the numbers that a device tells mean, in words; also those that this program does not know."""
+"""What the numbers that a device sends mean, in words; also numbers that this program does not know."""
 
 from __future__ import annotations
 

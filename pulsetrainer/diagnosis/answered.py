@@ -1,4 +1,4 @@
-"""From what a diagnosis knows at its end to the noun, with the model extended by what was found."""
+"""From what a diagnosis knows at its end to the artefact, with the model extended by what was found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which state of the device explains what is left: every one of a bank, scored on time that was left out.
+"""Which state of the device explains what is left: each one of a bank is scored on time that was left out.
 
 For each kind of state and each time constant of a grid the columns are curves over the state, added to the
 output or to its gain, less what the weights and the causes in the model can do. A ridge fit on the rest of

@@ -1,4 +1,4 @@
-"""How far apart the squares of two fits may be though neither is better."""
+"""How far the sums of squares of two fits may differ though neither fit is better."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A drift told by the model as given, where refitted weights hide it.
+"""A drift that shows against the model as given, where refitted weights hide it.
 
 Weights that are refitted to a record hold much of a drift that is over before the input has gone through its
 range twice: what is left says neither where it began nor how fast it went. Where the model as given is far

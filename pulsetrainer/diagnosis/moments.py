@@ -1,4 +1,4 @@
-"""When something happened: all moments at which a sudden change fits as well as at the best one.
+"""When something happened: the moments at which a sudden change fits as well as at the best one.
 
 Along the time of a step the fit has many lows, and a refit stays in the one where it began; nor does the
 curvature at a low tell how far away others are as deep: a gain that changes while the output rests near its

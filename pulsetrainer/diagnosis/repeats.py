@@ -1,4 +1,4 @@
-"""Whether a cause repeats: whether it predicts whole pieces of the time that were left out of the fit."""
+"""Whether a cause repeats, that is, predicts whole pieces of time that were left out of the fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The units of the record itself: no second, ampere or newton decides anything.
+"""The record's own units: no decision depends on seconds, amperes or newtons.
 
 Causes are sought in these units and told in those of the record:
 

@@ -1,4 +1,4 @@
-"""What settles from the beginning of a record: heat in a short one looks like it, and a sudden change in any.
+"""What settles from the beginning of a record; heat in a short one, and a sudden change, look like it.
 
     y - (1 - e^(-x / l)) (k (y - y0) + b),    x the time, or the way of the input
 

@@ -1,4 +1,4 @@
-"""Records that are no text: numpy's .npz and .npy, MATLAB's .mat of any version, .wav.
+"""Records that are not text: numpy's .npz and .npy, MATLAB's .mat of any version, .wav.
 
 Every vector in the file is a column under its own name; a matrix gives one column for each of its shorter
 side. What is nested (a MATLAB structure, an HDF5 group) has its path for a name: ``run.force``. The time

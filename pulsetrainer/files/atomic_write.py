@@ -1,4 +1,4 @@
-"""Files appear whole or not at all, and over another only with ``--overwrite``: aside, then renamed."""
+"""Files appear whole or not at all, and replace another only with ``--overwrite``: renamed when complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounds of error figures, out of a TOML file: dotted metric name = [low, high]."""
+"""Bounds of error figures, from a TOML file: dotted metric name = [low, high]."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Resuming a recording: which file holds it, is it this one? ``steps.recording`` tells how far it came."""
+"""Resuming a recording: which file holds it, is it the same? How far it came: ``steps.recording``."""
 
 from __future__ import annotations
 

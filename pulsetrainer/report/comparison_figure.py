@@ -1,4 +1,4 @@
-"""The figure of a comparison: one panel a metric, one line a pulse and inversion, one place an evaluation."""
+"""The figure of a comparison: a panel per metric, a line per pulse and inversion, a place per evaluation."""
 
 from __future__ import annotations
 

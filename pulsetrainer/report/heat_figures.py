@@ -1,4 +1,4 @@
-"""The figure of the coil's temperature: what the duty told of it."""
+"""The figure of the coil's temperature: as the duty tells it."""
 
 from __future__ import annotations
 

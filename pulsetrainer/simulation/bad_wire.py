@@ -1,6 +1,6 @@
 """A bad wire: drops, flips, inserts, duplicates, delays and cuts bytes between host and device, from a seed.
 
-It sits between session and port, so that it works the same on whatever the port is. Damage is drawn per
+It sits between exchange and port, so that it works the same on whatever the port is. Damage is drawn per
 byte and direction: equal bytes meet equal damage however the operating system slices them.
 """
 

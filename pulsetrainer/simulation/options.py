@@ -1,4 +1,4 @@
-"""What a simulated device is to be, by its port's text: its parameters, parts that break, a bad wire.
+"""What a simulated device is to be, from its port's text: parameters, parts that break, a bad wire.
 
 Told before anything that is slow to load, so that a mistake in it is, too.
 """

@@ -1,4 +1,4 @@
-"""How true the beats of a session are, counted while it goes on: nothing grows but a line for each beat.
+"""How true the beats of a session are, counted while it goes on; only one line per beat is kept.
 
 Of each beat the force y (n,) is fitted to the target x (n,), moved, stretched and lifted,
 

@@ -50,15 +50,15 @@ def capture(
     signal
         "identification", "diagnostic", or samples (n,) in A as a ``core.excitations.Signal``.
     levels, current_max_A, speed_A_per_s
-        Of the identification signal: the levels whose cells it switches, its top, and how fast it moves.
+        For the identification signal: the levels whose cells it switches, its top, and how fast it moves.
     rate_Hz
-        Samples a second.
+        Samples per second.
     condition
         Go around the major loop once before recording, so that what came before is forgotten.
     repeats
         How often the signal is played, without a pause.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------

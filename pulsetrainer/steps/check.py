@@ -85,8 +85,8 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
 
         y = y_rest + offset + gain (M[u] - y_rest) + a lag + creep + what is left
 
-    Lag and creep are those that the calibration did not take for hysteresis (``core.beside_hysteresis``):
-    they are there on a device that nobody touched, and neither move the offset nor count as another shape.
+    Lag and creep are those that the calibration did not take for hysteresis (``core.beside_hysteresis``): an
+    unchanged device has them too, so they neither move the offset nor count as another shape.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     device
         The device, with its force sensor.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------

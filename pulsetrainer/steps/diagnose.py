@@ -30,21 +30,21 @@ def diagnose(
 
         M(u) = (output causes) o P o (input causes) (u)
 
-    with P a Preisach operator whose weights are refitted together with the parameters of the causes. How the
-    verdict is reached is told by ``diagnosis.procedure``, a stage at a time.
+    with P a Preisach operator whose weights are refitted together with the parameters of the causes.
+    ``diagnosis.procedure`` lists the stages that lead to the verdict.
 
     Parameters
     ----------
     runs
         Of one device, in the units of the model.
     quick
-        Only screen: it takes seconds, strengths are linearised, and there is nothing to extend the model by.
+        Only screen: it takes seconds, strengths are linearised, and nothing is found to extend the model by.
     seed
         Of the simulated null distribution.
     names
         Names of the runs and, last, of the model, for messages.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------

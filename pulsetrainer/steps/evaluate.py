@@ -54,7 +54,7 @@ def evaluate(
     measured
         One or several playbacks, or one run that the models were not fitted to.
     models
-        Models to compare on the run; gains are over the first one.
+        Models to compare on the run; improvements are over the first one.
     names, model_names
         Names of what is measured and of the models, for the notes and the table.
 

@@ -62,7 +62,7 @@ def identify(
         Measured input and output; all in the same units.
     levels
         Number of levels n_h; the model has n_h (n_h + 1) / 2 cells. None: 48, or one for every two samples of
-        a record that is shorter.
+        a shorter record.
     form
         "direct", "dual" or "signed"; "auto": the one that predicts blocks that were not fitted, the simplest
         where others are not much better.
@@ -80,7 +80,7 @@ def identify(
     names
         Names of the runs, for the notes.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------

@@ -75,17 +75,17 @@ def invert(
     periods
         Periods to play; the first one is not scored.
     slew
-        Fastest the drive may move, input unit a second. None: ``DEVICE_SLEW_A_PER_S`` for a model of a run
+        Fastest the drive may move, input unit per second. None: ``DEVICE_SLEW_A_PER_S`` for a model of a run
         that our own device recorded, no limit for any other.
     despite_warning
         Invert a model although its fit says that its form does not describe the record.
     rate_Hz
-        Samples of the drive a second. None: 1000, as our own device plays; for a model of any other, where
-        a period would have fewer than 50 samples or more than 100 000, as many as the pulse itself has.
+        Samples of the drive per second. None: 1000, as our own device plays. For a model of any other device,
+        where a period would have fewer than 50 samples or more than 100 000: as many as the pulse itself has.
     name
         Name of the model, for messages.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------

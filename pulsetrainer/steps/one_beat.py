@@ -1,4 +1,4 @@
-"""The one period that a drive repeats: a beat of a recording, or the pulse of a drive that there is."""
+"""The one period that a drive repeats: a beat of a recording, or the pulse of an existing drive."""
 
 from __future__ import annotations
 

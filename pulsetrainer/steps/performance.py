@@ -1,4 +1,4 @@
-"""A session under way: what is given out to the device, what comes back, and what it amounts to so far."""
+"""A session under way: what is sent to the device, what comes back, and what it amounts to so far."""
 
 from __future__ import annotations
 

@@ -93,10 +93,10 @@ def play(
     repeats
         How often each of the two drives is played.
     track_heat
-        Take the coil's temperature from the duty, before and between the drives, and make the compensated one
-        up for it; None: where the model has a thermal term and knows the coil.
+        Take the coil's temperature from the duty, before and between the drives, and let the compensated
+        drive allow for it; None: where the model has a thermal term and knows the coil.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
     watch
         Shown what comes back as it comes: name of the drive, number of the repeat, places (m,) on the samples
         of the drive, current and force (m,).
@@ -106,7 +106,7 @@ def play(
     ArgumentError
         ``repeats`` is below 1 or too large, or the device cannot play the drive.
     DataError
-        The drive is no current in A.
+        The drive is not a current in A.
     DeviceError
         A limit would stop the device, or it stopped by itself. The whole repeats so far are in the error's
         ``kept``.

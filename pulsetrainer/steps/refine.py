@@ -66,16 +66,16 @@ def refine(
     slew
         Fastest the current may move, A/s; None: as ``invert``.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------
     ArgumentError
         ``passes`` is below 1, or the device cannot play the drive.
     DataError
-        The drive is no current in A, has no model, or one without an inverse.
+        The drive is not a current in A, has no model, or has one without an inverse.
     DeviceError
-        The device stopped by itself, or its force reading is not to be trusted. Nothing is kept.
+        The device stopped by itself, or its force reading cannot be trusted. Nothing is kept.
     Interrupted
         Ctrl-C: the output was stopped first. From the second pass on ``kept`` is the drive of the best one.
 

@@ -243,7 +243,7 @@ def session(
     amplitude
         Height of the pulses, % of what every beat reaches.
     minutes, beats
-        The end; neither: after five minutes, or of the quiz.
+        When it ends; neither: after five minutes, or with the quiz.
     variability, respiration, ectopic
         Irregularity of the rhythm, %: see ``core.rhythm.Rhythm``.
     seed
@@ -253,18 +253,18 @@ def session(
     quiz, answers
         Number of questions, and the answers to them: a list, or a callable that is asked for each.
     decide
-        In the place of all that: asked for each beat what is played; see ``steps.conductor``.
+        Instead of all that: asked for each beat what is to be played; see ``steps.conductor``.
     track_heat
         As in ``perform``.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------
     UsageError
         There is no pulse of that name, or a rate, an amplitude or a pulse cannot be played.
     DataError
-        The model is of another device, or an answer names what is not asked.
+        The model is of another device, or an answer names a pulse that is not asked.
     DeviceError, Interrupted
         The device or the user stopped it; what was recorded is in the error's ``kept``.
 

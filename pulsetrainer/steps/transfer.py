@@ -27,11 +27,11 @@ _UNCERTAIN = 0.007  # of the variance may be left on the new pulse, or it goes w
 def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -> Waveform:
     """Return a drive that also asks for what refining found missing on another pulse.
 
-        ask' = target + E[missed on the way of this drive | missed on the way of the refined one]
+        ask' = target + E[missed on the path of this drive | missed on the path of the refined one]
 
-    What is missed is M[u] less the force measured, M the model; it is taken for a zero, a lag and a density
-    on the Preisach plane that the model lacks (``core.missed``). What belongs to one place of one pulse is
-    not transferred, and nothing is if it is not known whether it holds there: see Raises.
+    What is missed is M[u] less the force measured, with M the model; it is taken for a zero, a lag and a
+    density on the Preisach plane that the model lacks (``core.missed``). What belongs to one place of one
+    pulse is not transferred, and nothing is where nobody knows whether it still holds: see Raises.
 
     Parameters
     ----------
@@ -46,7 +46,8 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     ------
     DataError
         ``refined`` was not refined, or another model, method or rate made it; refining did not get down to
-        the noise; the parts of its beat do not tell each other; or this pulse goes where that one never was.
+        the noise; the parts of its beat do not predict each other; or this pulse goes where that one never
+        was.
 
     Examples
     --------

@@ -80,10 +80,10 @@ def tune(
         What the current must be able to follow: shapes, over the whole range, and the compensated currents of
         drives, which rise faster than the pulses that they press. ``pt.tune`` takes names and tables too.
     supply_V
-        Voltage of the supply where it has been measured: ohms and henries are then by it. None: by the
-        drop of the free-wheeling diode, 0.6 V. The gains need neither.
+        Voltage of the supply where it has been measured; ohms and henries then follow from it. None: they
+        follow from the drop of the free-wheeling diode, 0.6 V. The gains need neither.
     progress
-        Told the share of the work that is done, 0 to 1.
+        Called with the share of the work done, 0 to 1.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def tune(
         A drive goes beyond the device's range, or no diode explains the coil at that supply.
     DeviceError
         No coil, a shorted one, one that the supply cannot drive over the pulses (with the reason), a force at
-        rest, a fault, or a firmware that does not tell the duty. The output is off and the gains are those
+        rest, a fault, or a firmware that does not report the duty. The output is off and the gains are those
         from before.
     Interrupted
         Ctrl-C: the output was stopped first.

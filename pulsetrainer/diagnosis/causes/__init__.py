@@ -1,4 +1,4 @@
-"""The library of causes: every ``Cause`` with an id that a module of this folder defines is in it."""
+"""The library of causes: it holds every ``Cause`` with an id that a module of this folder defines."""
 
 from __future__ import annotations
 

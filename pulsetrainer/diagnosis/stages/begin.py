@@ -1,4 +1,4 @@
-"""Begin: the model that goes on is fitted to the beginning of the records too, where it can be.
+"""Begin: the model that goes on is also fitted to the beginning of the records, where it can be.
 
 The after-effects of what a device did before a record decay in it, so the search leaves the beginning of each
 record free (``design``). But a free beginning hides how a slow cause begins, and a model that is used

@@ -1,4 +1,4 @@
-"""Backward elimination: no cause that the others have made superfluous.
+"""Backward elimination: a cause that the others have made superfluous is dropped.
 
 Each cause is taken out of the full model in turn. As long as the least important one makes no relevant
 difference, or less than a five hundredth of that of all together (the formulas of the others are not that

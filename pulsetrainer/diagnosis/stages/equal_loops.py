@@ -1,4 +1,4 @@
-"""Equal loops: what the weights can hold is sought where they cannot.
+"""Equal loops: a cause that the weights can absorb is sought where they cannot.
 
 The weights can absorb a feedback of the output into the input almost entirely, so that no refit shows it. But
 all minor loops between the same two turns are congruent in a Preisach model, whatever its weights; their

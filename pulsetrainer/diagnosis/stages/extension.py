@@ -1,4 +1,4 @@
-"""Extension: the model with the causes that repeat, as it will be used.
+"""Extension: the model with the causes that repeat; never one that predicts worse than the model given.
 
 The search judges a model on averages, with a free offset and a free beginning. What is used is a model on
 levels of its own, starting from rest. It is made here, and must predict these same records better than the

@@ -1,4 +1,4 @@
-"""First stroke: asked about again, now that causes are known.
+"""First stroke: looked at again, now that causes are known.
 
 The first stroke of a device that was not cycled before differs from all later ones, and is left out before
 anything is fitted. If the device creeps, rings or runs in, the later strokes differ as well, and hide it. So

@@ -1,4 +1,4 @@
-"""Jumps: the raw data are asked again, now that causes are known.
+"""Jumps: the raw data are searched again, now that causes are known.
 
 A hum, too, looks like jumps between flat runs. So a gate that other causes can set off as well is applied
 once more to the output less what the causes found add to it, and its finding is dropped if it no longer

@@ -1,4 +1,4 @@
-"""Repetition: no cause goes into the model that does not predict time which was left out.
+"""Repetition: a cause goes into the model only if it predicts time that was left out of the fit.
 
 What wanders slowly looks like heat, creep or a step, and alternating blocks only interpolate it. So for each
 cause that belongs to the device, whole stretches, a fifth of the time each, are predicted from the others:

@@ -1,4 +1,4 @@
-"""Screening: every cause is scored against noise, and how small an effect would have shown is told.
+"""Screening: every cause is scored against noise, and the smallest effect that would have shown is noted.
 
 Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual fall?
 The same is tried on noise that looks like the residual but holds no cause, drawn again and again; of each

@@ -1,4 +1,4 @@
-"""Settling: what goes on from the beginning of a record, long after it, has a cause.
+"""Settling: what still settles long after the beginning of a record has a cause.
 
 What a device did before a record decays in it, and the search fits the beginning of each record freely. A
 sensor that warms up looks the same, and a free beginning holds nearly all of it. Where no slow cause was
