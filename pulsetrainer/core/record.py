@@ -29,6 +29,7 @@ class Record:
     start: State | None = None  # memory before the first sample; None: negative saturation
     dt_s: float | None = None  # even time step; None: only the order of the samples is known
     reference: FloatArray | None = None  # (n,) the input that was asked for, input unit
+    averaged: int = 1  # samples as measured, of which each of these is the mean
 
     def __post_init__(self) -> None:
         u = finite_vector("input", self.input, at_least=2)

@@ -83,7 +83,19 @@ def problem_for(
     longest = max(r.input.size * r.step for r in records)
     begins = np.cumsum([0.0] + [r.input.size * r.step for r in records]).tolist()
     frames = tuple(
-        Frame(r.step, r.input, span, reach, k, len(records), low, ends, begin_s=begins[k], longest_s=longest)
+        Frame(
+            r.step,
+            r.input,
+            span,
+            reach,
+            k,
+            len(records),
+            low,
+            ends,
+            begin_s=begins[k],
+            longest_s=longest,
+            averaged=r.averaged,
+        )
         for k, r in enumerate(records)
     )
     plane = Plane.uniform(low, high, levels)

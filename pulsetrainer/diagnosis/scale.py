@@ -162,4 +162,5 @@ def _slower(record: Record, step: float) -> Record:
         np.where(averaged(record.sample_weight) < 1.0, 0.0, 1.0),
         dt_s=step * per,
         reference=None if record.reference is None else averaged(record.reference),
+        averaged=per,
     )

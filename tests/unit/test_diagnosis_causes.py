@@ -196,6 +196,20 @@ def test_simple_formulas():
     np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=1), 1.1 * y + 0.4)
 
 
+@pytest.mark.parametrize(("per", "frequency"), [(1, 40.0), (3, 50.0), (4, 120.0), (3, 0.0)])
+def test_hum_has_its_own_amplitude_where_samples_were_averaged(per, frequency):
+    """On the means of ``per`` samples the cause adds the mean of the sine, not the sine at their middle."""
+    fine_s = 0.001
+    t = np.arange(3000) * fine_s
+    values = (0.3, 0.1, frequency)
+    phase = 2.0 * np.pi * frequency * (t - 0.5 * (per - 1) * fine_s)  # the first mean lies at time 0
+    wave = 0.3 * np.sin(phase) + 0.1 * np.cos(phase)
+    means = wave.reshape(-1, per).mean(axis=1)
+    frame = replace(_frame(np.zeros(means.size)), dt_s=per * fine_s, averaged=per)
+    added = CAUSE["periodic"].on_output(np.zeros(means.size), values, frame)
+    np.testing.assert_allclose(added, means, atol=1e-12)
+
+
 def test_a_step_is_shared_out_over_twenty_samples():
     """Half of it at its moment, none ten samples before, all ten samples after."""
     change = _shown("step", np.full(T.size, 2.0), 0.5, 0.1, 2.0) - 2.0

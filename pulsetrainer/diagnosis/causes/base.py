@@ -69,6 +69,7 @@ class Frame:
     zero: float = 0.0  # output of the hysteresis where its memory is empty: gains are about it
     begin_s: float = 0.0  # since the first record began, as if they had been made one after another
     longest_s: float = 0.0  # of the records, the longest; 0: this one
+    averaged: int = 1  # samples as measured, of which each of these is the mean
     past: Past | None = None  # what the causes remember of the piece before; None: there was none
     kept: dict[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)  # of the input alone
 

@@ -102,7 +102,7 @@ class Periodic(Cause):
         return _INDEPENDENT * max(frame.input.size for frame in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return y + _sine(values, frame.record, frame.time_s)
+        return y + _seen(values[-1], frame) * _sine(values, frame.record, frame.time_s)
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
         """Output (n,) without the sine."""
@@ -114,6 +114,13 @@ def _sine(values: Values, record: int, time_s: FloatArray) -> FloatArray:
     sine, cosine = values[2 * record : 2 * record + 2]
     phase = 2.0 * np.pi * values[-1] * time_s
     return np.asarray(sine * np.sin(phase) + cosine * np.cos(phase))
+
+
+def _seen(frequency: float, frame: Frame) -> float:
+    """Share of a sine's amplitude that the means of its samples show."""
+    half = np.pi * frequency * frame.dt_s
+    single = frame.averaged * np.sin(half / frame.averaged)
+    return float(np.sin(half) / single) if single != 0.0 else 1.0
 
 
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:
