@@ -180,13 +180,13 @@ def check_several(evaluations: Sequence[object]) -> None:
         )
 
 
-def check_measured(first: str, given: Sequence[Any], models: Sequence[Any]) -> None:
-    """Raise UsageError for artefacts that `evaluate` does not take together; ``first`` names one."""
+def check_measured(names: Sequence[str], given: Sequence[Any], models: Sequence[Any]) -> None:
+    """Raise UsageError for artefacts, with a name each, that `evaluate` does not take together."""
     counts = Counter(one.kind for one in given)
     if counts["playback"] == len(given) > 0:
         if models:
             raise UsageError(
-                f"{first} is a playback, and models are tested on a run",
+                f"{names[0]} is a playback, and models are tested on a run",
                 hint="leave `model` out, or give a run: pulsetrainer evaluate run.h5 --model model.h5",
             )
     elif not (counts["run"] == len(given) == 1 and models):
@@ -195,7 +195,15 @@ def check_measured(first: str, given: Sequence[Any], models: Sequence[Any]) -> N
         raise UsageError(
             "evaluate takes playbacks, or one run together with the models to test on it, or one session; "
             f"got {', '.join(got) or 'nothing'}",
-            hint="one session at a time; side by side: pulsetrainer compare ben.h5 carla.h5"
-            if counts["session"]
-            else "pulsetrainer evaluate run.h5 --model model.h5",
+            hint=_for_sessions(
+                [name for name, one in zip(names, given, strict=True) if one.kind == "session"]
+            )
+            or "pulsetrainer evaluate run.h5 --model model.h5",
         )
+
+
+def _for_sessions(names: Sequence[str]) -> str:
+    """Say what is done with the sessions of these names; empty where there are none."""
+    if len(names) > 1:
+        return f"one session at a time; to see them side by side: pulsetrainer compare {' '.join(names)}"
+    return f"one session at a time and nothing with it: {names[0]} alone" if names else ""
