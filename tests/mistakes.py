@@ -540,7 +540,7 @@ INSIDE = {
     ),
     "a heading that two columns have": Mistake(
         ("import", "twice.csv", "--input", "x", "--output", "x", "-o", "out.h5"),
-        *(3, "twice.csv has 2 columns with the heading 'x': they are called x#1, x#2", "such as 'x#1'"),
+        *(3, "2 columns have that heading, and are called x#1, x#2", "name one of them: 'x#1' or 'x#2'"),
     ),
     "a column without a name": Mistake(
         ("import", "wide.csv", "--input", "", "--output", "Kraft", "-o", "out.h5"),

@@ -149,9 +149,9 @@ class Table:
         same = [own for own in self.names if own.lower().startswith(f"{split_unit(name)[0].lower()}#")]
         if name.strip() and same:
             return DataError(
-                f"{self.path} has {len(same)} columns with the heading {name!r}: they are called "
-                + ", ".join(same),
-                hint=f"name one of them, such as {same[0]!r}",
+                f"{self.path} has no column {name!r} alone: {len(same)} columns have that heading, and are "
+                f"called {', '.join(same)}",
+                hint=f"name one of them: {' or '.join(map(repr, same))}",
             )
         near = [own for own in self.names if name.strip() and name.lower() in own.lower()]
         near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
