@@ -50,7 +50,7 @@ class UsageError(PulsetrainerError):
 class ExistsError(UsageError):
     """The output is there already, and nobody said that it may be overwritten."""
 
-    usual: ClassVar[str] = "allow overwriting, or name another file"
+    usual: ClassVar[str] = "give overwrite=True, or name another file"
 
     def __init__(self, path: Path | str, message: str = "", *, hint: str = usual) -> None:
         super().__init__(message or f"the output {path} already exists", hint=hint)
