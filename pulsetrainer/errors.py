@@ -62,7 +62,7 @@ class EndingError(UsageError):
 
     def __init__(self, path: Path, what: str, ending: str, *, usual: str = "out", then: str = "") -> None:
         got = f"ends in {path.suffix.lower()!r}" if path.suffix else "has no such ending"
-        other = path.parent / f"{path.stem.strip('- ') or usual}{ending}"
+        other = path.parent / f"{path.stem.removesuffix(ending).strip('-. ') or usual}{ending}"
         super().__init__(f"{what}, but {path} {got}", hint=f"name it {shlex.quote(str(other))}{then}")
 
 

@@ -158,6 +158,32 @@ _WORDS_IN_QUOTES = {
         *(("--settings", "", "show", "run.h5"), "--settings must name a file, got an empty name"),
         "leave it out",
     ),
+    "a folder as an output": (
+        *(("identify", "run.h5", "-o", "bare/"), "-o (--out) must name a file, got the folder bare/"),
+        "the name of a file behind it",
+    ),
+    "a home in quotes": (
+        *(("identify", "run.h5", "-o", "~/out.h5"), "the folder ~ does not exist", "without quotes"),
+    ),
+    "a port of blanks": (
+        *(("play", "drive.h5", "-o", "out.h5", "--port", " "), "--port must name a port", "leave it out"),
+    ),
+    "a pulse that a script left empty": (
+        *(("invert", "", "--model", "model.h5", "-o", "out.h5"), "there is no pulse ''", "name one of them"),
+    ),
+    "a signal that a script left empty": (
+        *(("capture", "", "-o", "out.h5"), "there is no signal ''", "pulsetrainer capture identification"),
+    ),
+    "a pulse in capitals": (
+        *(("invert", "NORMAL", "--model", "model.h5", "-o", "out.h5"), "there is no pulse 'NORMAL'"),
+        "did you mean normal?",
+    ),
+    "an ending without a name": (
+        *(("plot", "run.h5", "-o", ".png"), ".png has no such ending", "name it figure.png"),
+    ),
+    "settings of another format": (
+        *(("tune", "-o", "tuned.yaml"), "tuned.yaml ends in '.yaml'", "name it tuned.toml"),
+    ),
     "a blank behind an output": (
         *(("identify", "run.h5", "-o", "out.h5 "), "'out.h5 ' has a blank at an end", "name it 'out.h5'"),
     ),

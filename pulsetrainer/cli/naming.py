@@ -113,6 +113,11 @@ def _check_names(parameter: Any, typed: Any) -> None:
                 f"{named(parameter)} must name a file, got an empty name",
                 hint="write the name; if a script gives it, check that its variable is set",
             )
+        if name.endswith("/") and parameter.opts[0] in ("--out", "--html", "-o"):
+            raise UsageError(
+                f"{named(parameter)} must name a file, got the folder {name}",
+                hint="write the name of a file behind it",
+            )
         if name.startswith("--") and parameter.opts[0].startswith("-"):
             raise UsageError(
                 f"{named(parameter)} must name a file, got the option {name}",

@@ -30,8 +30,8 @@ class Shape:
         value = finite_vector("value", self.value, at_least=FEWEST_SAMPLES)
         if t.size != value.size:
             raise ArgumentError(
-                f"the waveform {self.name} needs one value for each time, got {t.size} times and "
-                f"{value.size} values",
+                f"the waveform {self.name} needs one value for each time, got shapes {t.shape} of time and "
+                f"{value.shape} of value",
                 hint="give as many of both",
             )
         if not np.all(np.diff(t) > 0):

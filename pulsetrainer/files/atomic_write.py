@@ -50,7 +50,9 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
     if not folder.exists():
         raise UsageError(
             f"the output {path} cannot be written: the folder {folder} does not exist",
-            hint=f"make the folder: mkdir -p {shlex.quote(str(folder))}",
+            hint="write the name without quotes: in quotes the shell takes it as it is"
+            if str(folder).startswith(("~", "$"))
+            else f"make the folder: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
