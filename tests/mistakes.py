@@ -85,7 +85,6 @@ def at_once() -> dict[str, Mistake]:
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
         "an option without its value": ("tune", "--drive"),
-        "an option in the place of a file": ("tune", "--drive", "--json"),
         "an option in the place of an output": ("capture", "identification", "-o", "--json"),
         "answers that no quiz asks for": (
             *("session", "--model", "model.h5", "-o", "out.h5"),
@@ -394,7 +393,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "a file in a folder that is absent": (
         *("show no/run.h5", 3, "no/run.h5 (argument FILE.h5)", "the folder no does not exist either"),
     ),
-    "an option in the place of a drive": (
+    "an option in the place of a file": (
         *("tune --drive --json", 2, "--drive must name a file, got the option --json", "after --drive"),
     ),
     "a command in capitals": ("SHOW run.h5", 2, "there is no command 'SHOW'", "did you mean show?"),

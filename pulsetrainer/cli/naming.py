@@ -56,6 +56,8 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse; UsageError where an option of one file was given twice, or what is typed names no file."""
+        if ctx.resilient_parsing:  # a line that is completed is not all there
+            return super().parse_args(ctx, args)
         try:
             typed, _, order = self.make_parser(ctx).parse_args(list(args))
         except Exception as error:
