@@ -187,6 +187,7 @@ WORDS = {
     "edges_unit": "unit of the edges: that of the input, or of the output of a dual model",
     "false_reversals": "reversals made by noise, taken out of the input before the fit",
     "fault": "why the device stopped early; empty if it did not",
+    "stopped_by_key": "where a key stopped the session, in words; empty if none did",
     "form": "direct, dual or signed",
     "learner": "who answered",
     "loop": "counterclockwise, clockwise, butterfly or none; of a falling output once it is turned to rise",

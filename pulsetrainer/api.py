@@ -8,11 +8,11 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
+from pulsetrainer.core.plane import float_array
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
@@ -265,5 +265,11 @@ def _shape(pulse: Pulse) -> Shape:
         return shape_of(pulse)
     if isinstance(pulse, str | Path):
         return pulses.read_pulse(str(pulse))
-    time_s, value = pulse
-    return Shape("pulse", np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64))
+    try:
+        time_s, value = pulse
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"a pulse must be a name, a file, a drive, or times and values, got a {type(pulse).__name__}",
+            hint="give the two together: (time_s, value)",
+        ) from error
+    return Shape("pulse", float_array("time", time_s), float_array("value", value))

@@ -7,6 +7,7 @@ error into an exit.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar, Final
@@ -49,11 +50,20 @@ class UsageError(PulsetrainerError):
 class ExistsError(UsageError):
     """The output is there already, and nobody said that it may be overwritten."""
 
-    usual: ClassVar[str] = "allow overwriting, or name another file"
+    usual: ClassVar[str] = "give overwrite=True, or name another file"
 
     def __init__(self, path: Path | str, message: str = "", *, hint: str = usual) -> None:
         super().__init__(message or f"the output {path} already exists", hint=hint)
         self.path = Path(path)
+
+
+class EndingError(UsageError):
+    """The name of an output promises another format than it gets, or none; the hint has a better one."""
+
+    def __init__(self, path: Path, what: str, ending: str, *, usual: str = "out", then: str = "") -> None:
+        got = f"ends in {path.suffix.lower()!r}" if path.suffix else "has no such ending"
+        other = path.parent / f"{path.stem.removesuffix(ending).strip('-. ') or usual}{ending}"
+        super().__init__(f"{what}, but {path} {got}", hint=f"name it {shlex.quote(str(other))}{then}")
 
 
 class DataError(PulsetrainerError):

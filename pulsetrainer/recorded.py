@@ -144,7 +144,7 @@ def session_into(
                 error.hint = error.hint or "run the command again"
                 raise
         if isinstance(decide, Steering):
-            done = replace(done, notes=(*done.notes, *decide.notes))
+            done = replace(done, stopped_by_key=decide.stopped_by_key)
         quiz = blind.quiz(out.stem) if blind else None
         recorder.keep(done.fields | {"quiz": quiz}, header())
         recorder.finish(complete=not done.fault, dropped_samples=done.dropped_samples)

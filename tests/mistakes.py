@@ -85,7 +85,6 @@ def at_once() -> dict[str, Mistake]:
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
         "an option without its value": ("tune", "--drive"),
-        "an option in the place of a file": ("tune", "--drive", "--json"),
         "an option in the place of an output": ("capture", "identification", "-o", "--json"),
         "answers that no quiz asks for": (
             *("session", "--model", "model.h5", "-o", "out.h5"),
@@ -131,11 +130,66 @@ def at_once() -> dict[str, Mistake]:
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
     found["no such file of bounds"] = Mistake(bounds, 2, "absent.toml")
     found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")
+    for name, (typed, where, then) in _WORDS_IN_QUOTES.items():
+        found[name] = Mistake(typed, 2, where, then)
     nowhere = ("play", "drive.h5", "-o", "out.h5", "--port", "")
     found["a port that a script left empty"] = Mistake(nowhere, 2, "--port must name a port", "leave it out")
     return found
 
 
+# with blanks, or nothing, between the quotes
+_WORDS_IN_QUOTES = {
+    "an output that a script left empty": (
+        *(("plot", "run.h5", "-o", ""), "-o (--out) must name a file, got an empty name"),
+        "check that its variable is set",
+    ),
+    "an output of blanks": (
+        *(("identify", "run.h5", "-o", " "), "-o (--out) must name a file, got an empty name"),
+        "write the name",
+    ),
+    "an input that a script left empty": (
+        *(("show", ""), "FILE.h5 must name a file, got an empty name", "check that its variable is set"),
+    ),
+    "a page that a script left empty": (
+        *(("evaluate", "played.h5", "--html", ""), "--html must name a file", "write the name"),
+    ),
+    "settings that a script left empty": (
+        *(("--settings", "", "show", "run.h5"), "--settings must name a file, got an empty name"),
+        "leave it out",
+    ),
+    "a folder as an output": (
+        *(("identify", "run.h5", "-o", "bare/"), "-o (--out) must name a file, got the folder bare/"),
+        "the name of a file behind it",
+    ),
+    "a home in quotes": (
+        *(("identify", "run.h5", "-o", "~/out.h5"), "the folder ~ does not exist", "without quotes"),
+    ),
+    "a port of blanks": (
+        *(("play", "drive.h5", "-o", "out.h5", "--port", " "), "--port must name a port", "leave it out"),
+    ),
+    "a pulse that a script left empty": (
+        *(("invert", "", "--model", "model.h5", "-o", "out.h5"), "there is no pulse ''", "name one of them"),
+    ),
+    "a signal that a script left empty": (
+        *(("capture", "", "-o", "out.h5"), "there is no signal ''", "pulsetrainer capture identification"),
+    ),
+    "a pulse in capitals": (
+        *(("invert", "NORMAL", "--model", "model.h5", "-o", "out.h5"), "there is no pulse 'NORMAL'"),
+        "did you mean normal?",
+    ),
+    "an ending without a name": (
+        *(("plot", "run.h5", "-o", ".png"), ".png has no such ending", "name it figure.png"),
+    ),
+    "settings of another format": (
+        *(("tune", "-o", "tuned.yaml"), "tuned.yaml ends in '.yaml'", "name it tuned.toml"),
+    ),
+    "a blank behind an output": (
+        *(("identify", "run.h5", "-o", "out.h5 "), "'out.h5 ' has a blank at an end", "name it 'out.h5'"),
+    ),
+    "a whole line in quotes": (
+        *(("show run.h5",), "there is no command 'show run.h5'", "the quotes: pulsetrainer show run.h5"),
+    ),
+}
 # said unclearly once, tried by hand: each now says what is wrong, and what to do about it
 _WORDS_OF_A_TIRED_HAND = {
     "a decimal comma": (
@@ -195,8 +249,8 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "capture identification -o --json",
             2,
-            "the name of a file is missing before --json",
-            "then --json",
+            "-o (--out) must name a file, got the option --json",
+            "write the name after -o, then --json",
         ),
     ),
     "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "bare holds none"),
@@ -319,6 +373,31 @@ _WORDS_OF_A_TIRED_HAND = {
         *("import nothing --input u --output y -o out.h5", 3, "nothing (argument", "no file here has"),
     ),
     "a figure for a pipe": ("plot run.h5 -o -", 2, "- has no such ending", "name it figure.png"),
+    "a table for a pipe": ("export run.h5 -o -", 2, "- has no such ending", "name it table.csv"),
+    "a model for a pipe": ("identify run.h5 -o -", 2, "- has no such ending", "name it out.h5"),
+    "a table for a device": ("export run.h5 -o /dev/full", 2, "/dev/full is not an ordinary file", "on disk"),
+    "settings without an ending": (
+        *("tune -o pulsetrainer", 2, "pulsetrainer has no such ending", "name it pulsetrainer.toml"),
+    ),
+    "another ending in another folder": (
+        *("identify run.h5 -o other/out.csv", 2, "other/out.csv ends in '.csv'", "name it other/out.h5"),
+    ),
+    "a word in braces that is not the name": (
+        *("import run.csv --input u --output y -o {nmae}.h5", 2, "has {nmae} in its name, expected {name}"),
+        "write {name}.h5 for",
+    ),
+    "an address of a table": (
+        *("import https://example.org/a.csv --input u --output y -o out.h5", 3, "(argument FILE.csv)"),
+        "download the file, and give its path",
+    ),
+    "a file in a folder that is absent": (
+        *("show no/run.h5", 3, "no/run.h5 (argument FILE.h5)", "the folder no does not exist either"),
+    ),
+    "an option in the place of a file": (
+        *("tune --drive --json", 2, "--drive must name a file, got the option --json", "after --drive"),
+    ),
+    "a command in capitals": ("SHOW run.h5", 2, "there is no command 'SHOW'", "did you mean show?"),
+    "a file as a command": ("run.h5", 2, "no command 'run.h5'", "pulsetrainer show run.h5"),
     "an update without its output": (
         *("check model.h5 --update", 2, "--update, which writes the updated model,", "give both"),
     ),
@@ -351,6 +430,8 @@ TABLES = {
     "still.csv": "t,F\n0,0\n1,1\n1,2\n2,3\n",
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
     "bare.csv": "0,0.1,2\n1,0.2,3\n2,0.3,4\n",
+    "back.csv": "Time,I [A],F [N]\n2024-01-01 10:00:03,0.1,1\n2024-01-01 10:00:02,0.2,2\n",
+    "twice.csv": "t,x,x\n0,1,2\n1,2,3\n",
     "excel.csv": "Zeit (s);Strom (A);Kraft (N)\n0,000;0,10;1.234,5\n0,001;0,20;1.235,5\n",
 }
 INSIDE = {
@@ -380,11 +461,12 @@ INSIDE = {
         ("import", "empty.csv", "-o", "out.h5"), 2, "empty.csv is empty", "export"
     ),
     "a session and a playback": Mistake(
-        ("evaluate", "session.h5", "played.h5"), 2, "got 1 playback, 1 session", "one session at a time"
+        *(("evaluate", "session.h5", "played.h5"), 2),
+        *("got 1 playback, 1 session", "one session at a time and nothing with it: session.h5 alone"),
     ),
     "a session, a run and a model": Mistake(
         *(("evaluate", "run.h5", "session.h5", "--model", "model.h5"), 2),
-        *("got 1 run, 1 session, 1 model", "one session at a time"),
+        *("got 1 run, 1 session, 1 model", "one session at a time and nothing with it: session.h5 alone"),
     ),
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
     "a model without its option": Mistake(
@@ -415,7 +497,7 @@ INSIDE = {
         ("evaluate", "played.h5", "--bounds", "bounds.toml"),
         2,
         "normal.continuous.mean_err",
-        "normal.continuous.mean_error_reduction_percent",
+        "the same command with --json and without --bounds lists them",
     ),
     "learnt from a drive that was not refined": Mistake(
         ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
@@ -445,7 +527,10 @@ INSIDE = {
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
     ),
     "a bench without its colon": Mistake(
-        ("capture", "identification", "-o", "out.h5", "--port", "bench"), 4, "no port bench", "--port bench:?"
+        ("capture", "identification", "-o", "out.h5", "--port", "bench"),
+        4,
+        "no port bench",
+        "write its colon: --port bench:\n",
     ),
     "a table of a pulse that is not there": Mistake(
         ("invert", "absent.csv", "--model", "model.h5", "-o", "out.h5"),
@@ -453,11 +538,11 @@ INSIDE = {
     ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
-        *(4, "no port bench?seed=3", "--port 'bench:?seed=3&creep=0'?"),
+        *(4, "no port bench?seed=3", "write its colon: --port 'bench:?seed=3&creep=0'"),
     ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
-        *(3, "would heat the coil to 108 % of its limit, even from cold", "fewer --levels"),
+        *(3, "playing this would heat the coil to 108 % of its limit, even from cold", "fewer --levels"),
     ),
     "a pulse whose time stands still": Mistake(
         ("invert", "still.csv", "--model", "model.h5", "-o", "out.h5"), 3, "line 4", "with more digits\n"
@@ -473,6 +558,25 @@ INSIDE = {
     "a separator of thousands, as Excel writes it in German": Mistake(
         ("import", "excel.csv", "--input", "Strom (A)", "--output", "Kraft (N)", "-o", "out.h5"),
         *(3, "excel.csv has '1.234,5' in column Kraft (N), line 2", "without thousands separators"),
+    ),
+    "dates that go back": Mistake(
+        ("import", "back.csv", "--input", "I [A]", "--output", "F [N]", "-o", "out.h5"),
+        *(3, "at line 3: 2024-01-01 10:00:02 after 2024-01-01 10:00:03", "sort the rows"),
+    ),
+    "a heading that two columns have": Mistake(
+        ("import", "twice.csv", "--input", "x", "--output", "x", "-o", "out.h5"),
+        *(3, "2 columns have that heading, and are called x#1, x#2", "name one of them: 'x#1' or 'x#2'"),
+    ),
+    "a column without a name": Mistake(
+        ("import", "wide.csv", "--input", "", "--output", "Kraft", "-o", "out.h5"),
+        *(3, "wide.csv has no column ''; it has time, Spannung", "name one of these\n"),
+    ),
+    "a unit that nobody knows": Mistake(
+        (
+            *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--output-unit", "furlong"),
+            *("-o", "out.h5"),
+        ),
+        *(3, "--output-unit 'furlong' is not a known unit", "give --output-unit, such as N"),
     ),
     "nobody at the other side": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "socket://localhost:1"),

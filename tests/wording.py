@@ -57,6 +57,7 @@ MESSAGES = {
     "recording is finished": Message("finished", "a new run"),
     "disk is full": Message("is full", "kept", "{folder}", got="bytes are left"),
     "no folder": Message("does not exist", "mkdir -p", "the folder {folder}"),
+    "folder deleted": Message("does not exist any more", "go to another one", "the folder you are in"),
     "no sound provenance": Message("the provenance is not", "", "{file}"),
     "no provenance": Message("'provenance' is missing", "", "{file}"),
     "not writable": Message("not writable", "", "{folder}"),

@@ -14,7 +14,6 @@ from pulsetrainer.artefacts.shown import Shown
 # A finger tells two forces apart that differ by 7 %: X. D. Pang, H. Z. Tan, N. I. Durlach, Manual
 # discrimination of force using active finger motion, Perception & Psychophysics 1991, 49, 531-540.
 WEBER_FRACTION = 0.07
-BY_KEY = "stopped by key"  # what the note begins with that says so
 FIGURES = (
     "rate_cv_percent", "amplitude_cv_percent", "beat_timing_max_ms", "mean_abs_error_percent",
     "max_abs_error_percent", "nrmse", "augmentation_index_error_percent",
@@ -133,6 +132,7 @@ class Session(Shown):
     clipped_samples: int = 0
     fault: str = ""
     notes: tuple[str, ...] = ()
+    stopped_by_key: str = ""  # where, in words
     # where heat was tracked: a reading every second
     temperature_s: Annotated[FloatArray | None, Data("s", "time of the temperature", "window")] = None
     temperature_K: Annotated[
@@ -151,7 +151,7 @@ class Session(Shown):
     @property
     def ended_early(self) -> str:
         """Why it ended before its time: the fault, or where it was stopped by key; empty: it did not."""
-        return self.fault or next((note for note in self.notes if note.startswith(BY_KEY)), "")
+        return self.fault or self.stopped_by_key
 
     def figures(self) -> dict[str, float]:
         """Main figures by name."""

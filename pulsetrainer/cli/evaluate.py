@@ -47,7 +47,7 @@ def evaluate(
             _of_session(job, inputs[0], measured[0], html, alone=not (model or out or bounds))
             return
         models = [job.load(path, pt.Model) for path in model]
-        check_measured(str(inputs[0]), measured, models)  # before the verb, which is slow to import
+        check_measured(list(map(str, inputs)), measured, models)  # before the verb, which is slow to import
         from pulsetrainer.steps.evaluate import breaches
 
         progress(0.2)

@@ -9,7 +9,7 @@ from typer import Argument, Context, Option
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import EndingError
 
 _TABLES = (".csv", ".txt")
 
@@ -28,12 +28,8 @@ def export(
 
     Example: pulsetrainer export run.h5 -o run.csv
     """
-    if out.suffix.lower() not in _TABLES:
-        raise UsageError(
-            f"a table is written as CSV, but {out} "
-            + (f"ends in {out.suffix!r}" if out.suffix else "has no such ending"),
-            hint=f"name it {out.stem}.csv",
-        )
+    if out.suffix.lower() not in _TABLES and (out.is_file() or not out.exists()):
+        raise EndingError(out, "a table is written as CSV", ".csv", usual="table")
     job = Job(context, inputs=(file,), outputs=(out,))
     artefact = job.load_any(file)
     with job.working(f"exporting {file.name}"):

@@ -164,17 +164,25 @@ def _problem_of(error: Exception) -> PulsetrainerError:
         return Interrupted(_STOPPED)
     if isinstance(error, MemoryError):
         return DataError("there is not enough memory for this", hint="use fewer levels, or a shorter record")
-    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+    told = _of_the_system(error) if isinstance(error, OSError) else None
+    return told or PulsetrainerError(f"a bug: {type(error).__name__}: {error}", hint=_DEBUG_HINT)
+
+
+def _of_the_system(error: OSError) -> DataError | None:
+    """Return what is wrong with a name, a folder or the place that the results go to; None for the rest."""
+    if error.errno == errno.ENAMETOOLONG:
         name = str(error.filename)
         return DataError(
             f"the name {name[:20]}... has {len(name)} characters: {error.strerror}", hint="shorten it"
         )
+    if isinstance(error, FileNotFoundError) and error.filename is None:  # of where relative names begin
+        return DataError("the folder you are in does not exist any more", hint="go to another one: cd ~")
     if isinstance(error, PermissionError) and error.filename:
         return DataError(f"{error.filename}: {error.strerror}", hint="change its permissions")
-    if isinstance(error, OSError) and error.filename is None and error.errno in _NOWHERE:
+    if error.filename is None and error.errno in _NOWHERE:
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would fail again
         return DataError(
             f"the results could not be printed: {error.strerror}", hint="free some space, or print elsewhere"
         )
-    return PulsetrainerError(f"a bug: {type(error).__name__}: {error}", hint=_DEBUG_HINT)
+    return None

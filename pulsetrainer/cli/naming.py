@@ -14,7 +14,7 @@ from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import next_step, to_make, with_files
-from pulsetrainer.cli.usage import spaced
+from pulsetrainer.cli.usage import named, spaced
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
@@ -55,9 +55,11 @@ class Command(TyperCommand):
     context_class = HelpContext
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse; UsageError where an option of one file was given twice: the first would be lost."""
+        """Parse; UsageError where an option of one file was given twice, or what is typed names no file."""
+        if ctx.resilient_parsing:  # a line that is completed is not all there
+            return super().parse_args(ctx, args)
         try:
-            _, _, order = self.make_parser(ctx).parse_args(list(args))
+            typed, _, order = self.make_parser(ctx).parse_args(list(args))
         except Exception as error:
             setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
             raise
@@ -68,6 +70,8 @@ class Command(TyperCommand):
                     f"{name} was given {times} times, and takes one file",
                     hint="give it once, or run the command once for each",
                 )
+        for one in self.params:
+            _check_names(one, typed.get(one.name or ""))
         return super().parse_args(ctx, args)
 
     def get_short_help_str(self, limit: int = 45) -> str:
@@ -99,6 +103,28 @@ class Command(TyperCommand):
         except PulsetrainerError as error:
             error.hint = with_files(error.hint, ctx.params)
             raise
+
+
+def _check_names(parameter: Any, typed: Any) -> None:
+    """UsageError for a file without a name, as a script leaves it, or an option in the place of one."""
+    for name in typed if isinstance(typed, list | tuple) else (typed,):
+        if parameter.type.name != "path" or not isinstance(name, str):
+            continue
+        if not name.strip():
+            raise UsageError(
+                f"{named(parameter)} must name a file, got an empty name",
+                hint="write the name; if a script gives it, check that its variable is set",
+            )
+        if name.endswith("/") and parameter.opts[0] in ("--out", "--html", "-o"):
+            raise UsageError(
+                f"{named(parameter)} must name a file, got the folder {name}",
+                hint="write the name of a file behind it",
+            )
+        if name.startswith("--") and parameter.opts[0].startswith("-"):
+            raise UsageError(
+                f"{named(parameter)} must name a file, got the option {name}",
+                hint=f"write the name after {parameter.opts[0]}, then {name}",
+            )
 
 
 def _files(context: typer.Context) -> dict[Path, int]:

@@ -7,10 +7,25 @@ from pathlib import Path
 
 import typer
 
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import EndingError, UsageError
 
 _FORMATS = {
-    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
+    *(
+        ".h5",
+        ".csv",
+        ".tsv",
+        ".txt",
+        ".dat",
+        ".xls",
+        ".xlsx",
+        ".json",
+        ".toml",
+        ".yaml",
+        ".yml",
+        ".npz",
+        ".mat",
+        ".wav",
+    ),
     *(".png", ".svg", ".pdf", ".html", ".htm"),
 }
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
@@ -43,9 +58,9 @@ def check_ending(path: Path, context: typer.Context) -> None:
         then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
         if ending == ".html" and "html" in context.params:
             then = f", and the page with --html {path}"
-    formats = _FORMATS | {""} if right == ".html" else _FORMATS  # a browser goes by the ending
-    if path.is_dir():  # which is told when it is looked at
+    # a browser goes by the ending, and a file of settings without one would not be found again
+    formats = _FORMATS if right == ".h5" and path.name != "-" else _FORMATS | {""}
+    if path.is_dir() or path.is_char_device():  # which is told when it is looked at
         return
     if ending in formats and not (ending and right.startswith(ending)):  # .htm is a page too
-        got = f"ends in {ending!r}" if ending else "has no such ending"
-        raise UsageError(f"{what}, but {path} {got}", hint=f"name it {path.stem}{right}{then}")
+        raise EndingError(path, what, right, then=then)

@@ -52,7 +52,7 @@ def say_pressed(
     from pulsetrainer.files import store
     from pulsetrainer.steps.stopped import kept_in, raise_if_stopped
 
-    job.notes(done.notes)
+    job.notes([*done.notes, *filter(None, (done.stopped_by_key,))])
     if html is not None:
         sheet(job, html, store.read(out, pt.Session), store.read_header(out))
     try:

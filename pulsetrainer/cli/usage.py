@@ -84,11 +84,11 @@ def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageErro
     source = context.get_parameter_source(parameter.name) if context is not None else None
     if source is not None and source.name == "ENVIRONMENT":  # nobody typed the option
         return UsageError(
-            f"the variable {parameter.envvar} (for {_named(parameter)}) {must}",
+            f"the variable {parameter.envvar} (for {named(parameter)}) {must}",
             hint=f"correct it, or take it away: unset {parameter.envvar}",
         )
     hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
-    return UsageError(f"{_named(parameter)} {must}", hint=hint)
+    return UsageError(f"{named(parameter)} {must}", hint=hint)
 
 
 def check_apart(words: Sequence[str]) -> None:
@@ -138,7 +138,7 @@ def _alike(given: str, context: Any) -> list[str]:
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
     like = example[1] if example else help_
-    said = f"{_named(parameter)} is missing: {_meaning(parameter)}"
+    said = f"{named(parameter)} is missing: {_meaning(parameter)}"
     given: list[Path] = (context.params.get("files") or []) if context is not None else []
     if given and parameter.name in ("input_column", "output_column"):
         try:
@@ -198,13 +198,26 @@ def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageE
         return UsageError("there is no command 'help'", hint=f"{command} {of[0]} --help")
     if unknown[1] in _NO_COMMAND:
         return UsageError(f"there is no command {unknown[1]!r}", hint=_NO_COMMAND[unknown[1]])
-    near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""
-    return UsageError(f"there is no command {unknown[1]!r}", hint=f"{near}{help_}")
+    return UsageError(
+        f"there is no command {unknown[1]!r}", hint=_command_for(unknown[1], unknown[2], parsed)
+    )
+
+
+def _command_for(word: str, near: str, parsed: Any) -> str:
+    """What to type in the place of a word that is no command: a file, a line in quotes, capitals."""
+    first = word.strip().partition(" ")[0]
+    if first != word and first in parsed.commands:
+        return f"leave out the quotes: pulsetrainer {word}"
+    if Path(word).is_file():
+        return f"to look into a file: pulsetrainer show {shlex.quote(word)}"
+    if first.lower() in parsed.commands:
+        near = first.lower()
+    return f"did you mean {near}? All commands: pulsetrainer --help" if near else "pulsetrainer --help"
 
 
 def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
-    taken = [_named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
+    taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
     instead = _INSTEAD.get(name, "{command} --help")
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
@@ -217,7 +230,7 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     )
 
 
-def _named(parameter: Any) -> str:
+def named(parameter: Any) -> str:
     """Name of an option as it is typed, or of an argument as the help names it."""
     names = sorted((name for name in parameter.opts if name.startswith("-")), key=len)
     if not names:
@@ -259,7 +272,7 @@ def _as_a_number(parameter: Any, must: str) -> str:
     if said and unit[1:] == said[1] and unit[0] in _FACTORS and f"{said[1]} or " not in _meaning(parameter):
         return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
     # what is typed in ms must not be taken for s
-    return f"write the number alone, without a unit; {_named(parameter)} is: {_meaning(parameter)}"
+    return f"write the number alone, without a unit; {named(parameter)} is: {_meaning(parameter)}"
 
 
 def _choice(parameter: Any, must: str) -> str:

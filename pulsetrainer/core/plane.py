@@ -37,7 +37,7 @@ def float_array(name: str, values: ArrayLike) -> FloatArray:
         return np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ArgumentError(
-            f"{name} must be numbers, got {error}", hint=f"pass {name} as one array of floats"
+            f"{name} must be numbers: {error}", hint=f"pass {name} as one array of floats"
         ) from error
 
 
@@ -50,7 +50,7 @@ def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatAr
     if array.ndim != 1 or array.size < at_least:
         raise ArgumentError(
             f"{name} must be a vector of at least {at_least} samples, got shape {array.shape}",
-            hint=f"pass a one-dimensional {name}",
+            hint=f"pass a one-dimensional {name}" if array.ndim != 1 else f"pass at least {at_least} samples",
         )
     bad = ~np.isfinite(array)
     if bad.any():

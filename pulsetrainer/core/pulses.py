@@ -28,11 +28,17 @@ class Shape:
     def __post_init__(self) -> None:
         t = finite_vector("time", self.time_s, at_least=FEWEST_SAMPLES)
         value = finite_vector("value", self.value, at_least=FEWEST_SAMPLES)
-        if t.size != value.size or not np.all(np.diff(t) > 0):
+        if t.size != value.size:
             raise ArgumentError(
-                f"the waveform {self.name} needs one value for each of its increasing times, got shapes "
-                f"{t.shape} of time and {value.shape} of value",
-                hint="correct the time column",
+                f"the waveform {self.name} needs one value for each time, got shapes {t.shape} of time and "
+                f"{value.shape} of value",
+                hint="give as many of both",
+            )
+        if not np.all(np.diff(t) > 0):
+            k = int(np.flatnonzero(np.diff(t) <= 0)[0])
+            raise ArgumentError(
+                f"the time of the waveform {self.name} does not increase: {t[k + 1]:g} s after {t[k]:g} s",
+                hint="sort the samples by time, each time once",
             )
         with np.errstate(over="ignore"):
             length, span = self.period_s, float(np.ptp(value))

@@ -116,7 +116,7 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         scheme = scheme.rstrip(":").lower()
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint=f"did you mean `port` {shlex.quote(f'{scheme}:{mark}{rest}')}?"
+            hint=f"write its colon: `port` {shlex.quote(f'{scheme}:{mark}{rest}')}"
             if scheme in ("bench", "qemu")
             else "check the cable, then `pulsetrainer ports`; without a device use `port` bench:, over a "
             "network socket://host:port",

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from pulsetrainer.errors import DataError, ExistsError, UsageError
 from pulsetrainer.files.file_lock import Lease, create_locked, sweep
-from pulsetrainer.files.input_file import check_no_option
 
 _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
@@ -22,11 +21,16 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 def check_output(path: Path | str, overwrite: bool = False) -> None:
     """Raise UsageError BEFORE the work that would be lost, where an output cannot be written.
 
-    It exists and ``overwrite`` is not set, or its folder is missing or not writable, or it is an option.
+    It exists and ``overwrite`` is not set, its folder is missing or not writable, or its name ends in
+    a blank.
     DataError where the disk has no room for another file.
     """
     path = Path(path)
-    check_no_option(path)
+    if path.name != path.name.strip():
+        whole = path.with_name(path.name.strip() or "out.h5")
+        raise UsageError(
+            f"the output {str(path)!r} has a blank at an end of its name", hint=f"name it {str(whole)!r}"
+        )
     try:
         folder = path.resolve().parent if path.is_symlink() else path.parent
         _check_target(path, folder, overwrite=overwrite)
@@ -46,7 +50,9 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
     if not folder.exists():
         raise UsageError(
             f"the output {path} cannot be written: the folder {folder} does not exist",
-            hint=f"make the folder: mkdir -p {shlex.quote(str(folder))}",
+            hint="write the name without quotes: in quotes the shell takes it as it is"
+            if str(folder).startswith(("~", "$"))
+            else f"make the folder: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")

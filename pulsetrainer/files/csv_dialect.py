@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -113,6 +114,14 @@ def detect(path: Path) -> Dialect:
     comments += [(row.number, row.text.strip()) for row in rows[:start]]
     dialect = _with_header(path, encoding, delimiter, rows[start:], sorted(comments))
     return replace(dialect, remarks=remarks)
+
+
+def cell_at(path: Path, line: int, column: int) -> str:
+    """Return what stands in a cell of a text: line from 1, column from 0; raises as ``detect``."""
+    dialect = detect(path)
+    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+        text = next(islice(stream, line - 1, None), "")
+    return (*dialect.split(readable(text.strip("\r\n"))), *[""] * (column + 1))[column]
 
 
 def _first_lines(path: Path, encoding: str) -> tuple[str | None, list[_Line], list[_Line]]:

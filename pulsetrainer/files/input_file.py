@@ -38,12 +38,6 @@ def check_artefact(path: Path | str) -> None:
         raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 
 
-def check_no_option(path: Path) -> None:
-    """Raise UsageError for an option in the place of a file: the parser took it for a value."""
-    if str(path).startswith("--"):
-        raise UsageError(f"the name of a file is missing before {path}", hint=f"name the file, then {path}")
-
-
 def is_journal(path: Path | str) -> bool:
     """Whether a file is a recording under way, or one that was cut off; raises as ``check_file``."""
     return _first_bytes(Path(path)) == JOURNAL
@@ -55,7 +49,6 @@ def _first_bytes(path: Path) -> bytes:
         if path.is_dir():
             raise DataError(f"{path} is a folder, expected a file", hint=_files_in(path))
         if not path.exists():
-            check_no_option(path)
             raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():
             raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
@@ -91,7 +84,12 @@ def _offered(files: Iterable[Path]) -> list[Path]:
 def _names_in(folder: Path, path: Path) -> str:
     """Return a hint with the names in a folder that come nearest."""
     if not folder.is_dir():
-        return f"the folder {folder} does not exist either"
+        address = re.match(r"(https?|ftp):/", str(path))
+        return (
+            "it is an address: download the file, and give its path here"
+            if address
+            else f"check the path: the folder {folder} does not exist either"
+        )
     names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
     near = difflib.get_close_matches(path.name, names, n=10, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
@@ -162,8 +160,14 @@ _NAME = "{name}"  # in an output: one for each file
 def outputs_of(files: list[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
     """Return the files that are read into each output: all into one, or each into its own.
 
-    UsageError where two files would be written to one output.
+    UsageError where two files would be written to one output, or braces hold another word.
     """
+    unknown = next((word for word in re.findall(r"{\w*}", str(out)) if word != _NAME), "")
+    if unknown:
+        raise UsageError(
+            f"the output {out} has {unknown} in its name, expected {_NAME} or no braces",
+            hint=f"write {str(out).replace(unknown, _NAME)} for one run for each file",
+        )
     if _NAME not in str(out):
         return {out: tuple(files)}
     groups: dict[Path, tuple[Path, ...]] = {}

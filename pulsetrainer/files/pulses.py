@@ -28,8 +28,8 @@ def pulse_file(name: str) -> Path:
     """
     known = library()
     path = known.get(name, Path(name))
-    if name not in known and path.suffix.lower() != ".csv" and not path.exists():
-        near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
+    if name not in known and path.suffix.lower() != ".csv" and not (name.strip() and path.exists()):
+        near = difflib.get_close_matches(name.lower(), known, n=3, cutoff=0.6)
         hint = f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or "
         hint += "give any CSV file with a time and a value column, such as my-pulse.csv"
         several = re.split(r"[,;|\s]+", name)

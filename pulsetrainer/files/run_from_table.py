@@ -25,7 +25,7 @@ from pulsetrainer.artefacts.units import (
     symbol_of,
 )
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.csv_dialect import column_words
+from pulsetrainer.files.csv_dialect import cell_at, column_words
 from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.time_stamps import stated_rate, unit_of_count
 from pulsetrainer.files.timing import check_timing
@@ -411,8 +411,10 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     back = np.flatnonzero(time_s[1:] <= time_s[:-1])
     if back.size:
         row = int(back[0]) + 1
-        this, before = (f"{stamps[k]:.15g} {unit or 's'}" for k in (row, row - 1))
-        if this != before:
+        this, before = (
+            _as_written(table, name, k, f"{stamps[k]:.15g} {unit or 's'}") for k in (row, row - 1)
+        )
+        if stamps[row] != stamps[row - 1]:
             hint = "sort the rows"
             other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
         elif all(column[row] == column[row - 1] for column in table.columns.values()):
@@ -426,3 +428,9 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
             hint=hint + other * of_record,
         )
     return time_s
+
+
+def _as_written(table: Table, name: str, row: int, value: str) -> str:
+    """Return a time as it stands in the file where it is a time of day or a date there, else its value."""
+    cell = cell_at(table.path, table.line_of(row), table.index(name)) if table.shifts else ""
+    return cell if ":" in cell else value

@@ -59,6 +59,10 @@ SETTINGS = (
 
 def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
     """Return the file of settings that counts, or None; UsageError where one is named that is not there."""
+    if named is not None and not named.strip():
+        raise UsageError(
+            "--settings must name a file, got an empty name", hint="leave it out, or name the file"
+        )
     chosen = named or environment.get(VARIABLE)
     if chosen:
         if not Path(chosen).is_file():

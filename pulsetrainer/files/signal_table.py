@@ -24,7 +24,7 @@ def signal_file(signal: str, known: Sequence[str]) -> Path | None:
     if signal in known:
         return None
     path = Path(signal)
-    if path.suffix.lower() != ".csv" and not path.exists():
+    if path.suffix.lower() != ".csv" and not (signal.strip() and path.exists()):
         raise UsageError(
             f"there is no signal {signal!r}; known signals: {', '.join(known)}, or a CSV file",
             hint="pulsetrainer capture identification -o run.h5",

@@ -135,16 +135,7 @@ class Table:
         if k is None:
             k = {str(number): place for place, number in enumerate(range(1, len(self.names) + 1))}.get(name)
         if k is None:
-            near = [own for own in self.names if name.lower() in own.lower()]
-            near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
-            hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else "name one of these"
-            bare_numbers = self.names == tuple(f"column{k}" for k in range(1, len(self.names) + 1))
-            raise DataError(
-                f"{self.path} has no column {name!r}; "
-                + ("it has no headings: its columns are called " if bare_numbers else "it has ")
-                + ", ".join(self.names),
-                hint="name columns by number: 1 is the first" if bare_numbers else hint,
-            )
+            raise self._no_column(name)
         if self.names[k] in self.text_names:
             raise DataError(
                 f"{self.path} has text, not numbers, in {column_words(self.names[k])}, as in {self.place(0)}",
@@ -152,6 +143,26 @@ class Table:
                 "01.05.2024 12:34:56",
             )
         return k
+
+    def _no_column(self, name: str) -> DataError:
+        """Return what is wrong with a name that no column has, or that several have."""
+        same = [own for own in self.names if own.lower().startswith(f"{split_unit(name)[0].lower()}#")]
+        if name.strip() and same:
+            return DataError(
+                f"{self.path} has no column {name!r} alone: {len(same)} columns have that heading, and are "
+                f"called {', '.join(same)}",
+                hint=f"name one of them: {' or '.join(map(repr, same))}",
+            )
+        near = [own for own in self.names if name.strip() and name.lower() in own.lower()]
+        near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
+        hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else "name one of these"
+        bare_numbers = self.names == tuple(f"column{k}" for k in range(1, len(self.names) + 1))
+        return DataError(
+            f"{self.path} has no column {name!r}; "
+            + ("it has no headings: its columns are called " if bare_numbers else "it has ")
+            + ", ".join(self.names),
+            hint="name columns by number: 1 is the first" if bare_numbers else hint,
+        )
 
 
 def _lacking(bad: int, rows: int) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import EndingError
 
 FORMATS: Final = ("png", "svg", "pdf")
 
@@ -13,14 +13,11 @@ FORMATS: Final = ("png", "svg", "pdf")
 def figure_format(path: Path, what: str, *more: str) -> str:
     """Return the format that the name of a figure asks for; ``more`` are those that are no figures.
 
-    UsageError where it is none of them.
+    EndingError where it is none of them.
     """
     form = path.suffix.lower().lstrip(".")
     if form not in (*FORMATS, *more):
         known = [*FORMATS, *more]
-        raise UsageError(
-            f"{what} is written as {', '.join(known[:-1])} or {known[-1]}, but {path} "
-            + (f"ends in {path.suffix.lower()!r}" if form else "has no such ending"),
-            hint=f"name it {path.parent / (path.stem.lstrip('-') or 'figure')}.png",
-        )
+        written_as = f"{what} is written as {', '.join(known[:-1])} or {known[-1]}"
+        raise EndingError(path, written_as, ".png", usual="figure")
     return form

@@ -7,11 +7,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import Signature, signature
+from os import PathLike
 from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
 
 EXCITATIONS = ("identification", "diagnostic")
+_NUMBERS = {"int", "float", "int | None", "float | None"}
 MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
@@ -63,7 +65,7 @@ def check_quiz(choices: int, questions: int) -> None:
         )
 
 
-def _check_is(kinds: tuple[type, ...], one: object) -> None:
+def _check_is(kinds: tuple[type, ...], one: object, verb: str) -> None:
     """Raise ArgumentError for what is of another kind, such as the name of the file that it is in."""
     if not isinstance(one, kinds):
         name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
@@ -71,11 +73,31 @@ def _check_is(kinds: tuple[type, ...], one: object) -> None:
             f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
             hint=f"pt.load({name!r}) gives it"
             if "." in name
-            else "its help shows the order of the arguments",
+            else f"help(pt.{verb}) shows the order of the arguments",
         )
 
 
+def _check_plain(name: str, annotation: str, one: object) -> None:
+    """Raise ArgumentError for text as a number, no seed, no device, and what names no file."""
+    if annotation in _NUMBERS and isinstance(one, str):
+        raise ArgumentError(
+            f"`{name}` must be a number, got {one!r}", hint="write it without quotes and without a unit"
+        )
+    if name == "seed" and isinstance(one, int | float) and one < 0:
+        raise ArgumentError(f"`seed` must be a whole number, 0 or more, got {one}", hint="0 is the usual one")
+    if annotation == "Device" and not hasattr(one, "info"):
+        port = one if isinstance(one, str) else "bench:"
+        raise ArgumentError(
+            f"expected a device, got {one!r}", hint=f"with pt.open_device({port!r}) as device: ..."
+        )
+    if annotation == "Path | str" and not (isinstance(one, str | PathLike) and str(one).strip()):
+        got = repr(one) if isinstance(one, str) else _a(type(one))
+        raise ArgumentError(f"`{name}` must name a file, got {got}", hint="give its name, such as 'run.h5'")
+
+
 def _a(kind: type) -> str:
+    if kind is type(None):
+        return "None"
     return f"an {kind.__name__}" if kind.__name__[0] in "AEIOaeio" else f"a {kind.__name__}"
 
 
@@ -101,7 +123,8 @@ def readable(verb: Callable[..., Any]) -> Signature:
 def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
     """Return a verb that raises ArgumentError for an artefact of another kind than its annotations name.
 
-    Where they name a sequence, each that is in it is looked at. Its signature is readable.
+    Where they name a sequence, each that is in it is looked at. Text as a number, what is no device, and what
+    names no file are refused too. Its signature is readable.
     """
     whole = signature(verb)
     kinds = {name: _kinds_in(str(one.annotation)) for name, one in whole.parameters.items()}
@@ -113,13 +136,15 @@ def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
         except TypeError:  # the verb says it better
             return verb(*given, **named)
         for name, one in bound.arguments.items():
+            annotation = str(whole.parameters[name].annotation)
+            _check_plain(name, annotation, one)
             alone, each = kinds[name]
             if each and isinstance(one, Iterable) and not isinstance(one, str):
                 bound.arguments[name] = several(one)  # which may be gone through only once
                 for single in bound.arguments[name]:
-                    _check_is(each, single)
-            elif (alone or each) and one is not None:
-                _check_is(alone or each, one)
+                    _check_is(each, single, verb.__name__)
+            elif (alone or each) and (one is not None or "None" not in annotation):
+                _check_is(alone or each, one, verb.__name__)
         return verb(*bound.args, **bound.kwargs)
 
     shown: Any = checked
@@ -180,13 +205,13 @@ def check_several(evaluations: Sequence[object]) -> None:
         )
 
 
-def check_measured(first: str, given: Sequence[Any], models: Sequence[Any]) -> None:
-    """Raise UsageError for artefacts that `evaluate` does not take together; ``first`` names one."""
+def check_measured(names: Sequence[str], given: Sequence[Any], models: Sequence[Any]) -> None:
+    """Raise UsageError for artefacts, with a name each, that `evaluate` does not take together."""
     counts = Counter(one.kind for one in given)
     if counts["playback"] == len(given) > 0:
         if models:
             raise UsageError(
-                f"{first} is a playback, and models are tested on a run",
+                f"{names[0]} is a playback, and models are tested on a run",
                 hint="leave `model` out, or give a run: pulsetrainer evaluate run.h5 --model model.h5",
             )
     elif not (counts["run"] == len(given) == 1 and models):
@@ -195,7 +220,15 @@ def check_measured(first: str, given: Sequence[Any], models: Sequence[Any]) -> N
         raise UsageError(
             "evaluate takes playbacks, or one run together with the models to test on it, or one session; "
             f"got {', '.join(got) or 'nothing'}",
-            hint="one session at a time; side by side: pulsetrainer compare ben.h5 carla.h5"
-            if counts["session"]
-            else "pulsetrainer evaluate run.h5 --model model.h5",
+            hint=_for_sessions(
+                [name for name, one in zip(names, given, strict=True) if one.kind == "session"]
+            )
+            or "pulsetrainer evaluate run.h5 --model model.h5",
         )
+
+
+def _for_sessions(names: Sequence[str]) -> str:
+    """Say what is done with the sessions of these names; empty where there are none."""
+    if len(names) > 1:
+        return f"one session at a time; to see them side by side: pulsetrainer compare {' '.join(names)}"
+    return f"one session at a time and nothing with it: {names[0]} alone" if names else ""

@@ -76,7 +76,7 @@ def evaluate(
     given, tested = several(measured), several(models)
     titles = named(names, [f"{one.kind} {number}" for number, one in enumerate(given, 1)])
     called = named(model_names, [f"model {n}" for n in range(1, len(tested) + 1)], argument="model_names")
-    check_measured(titles[0] if titles else "", given, tested)
+    check_measured(titles, given, tested)
     if tested:
         return _of_run(titles[0], given[0], tested, called)
     errors = tuple(_of_playback(name, one) for name, one in zip(titles, given, strict=True))
@@ -277,7 +277,8 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
         near = difflib.get_close_matches(unknown[0], figures, n=3) or sorted(figures)[:3]
         raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
-            hint=f"it has {', '.join(near)} and others: pulsetrainer evaluate --json lists them",
+            hint=f"it has {', '.join(near)} and others: the same command with --json and without --bounds "
+            "lists them",
         )
     return tuple(
         Breach(name, value, low, high)

@@ -83,6 +83,7 @@ class Performed:
     pulses: tuple[str, ...]
     temperature_s: FloatArray | None = None  # where heat was tracked
     temperature_K: FloatArray | None = None  # against calibration
+    stopped_by_key: str = ""  # where, in words
 
     @property
     def fields(self) -> dict[str, Any]:

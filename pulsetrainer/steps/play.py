@@ -122,10 +122,6 @@ def play(
     >>> played.complete, played.compensated.output.shape[0]
     (True, 1)
     """
-    if isinstance(device, str):
-        raise ArgumentError(
-            f"expected a device, got {device!r}", hint=f"with pt.open_device({device!r}) as device: ..."
-        )
     _check(drive, repeats)
     check_peak(np.concatenate((drive.compensated, drive.scaled)), device.info.current_limit_A)
     tracked = _Tracked.of(drive, device, track_heat)

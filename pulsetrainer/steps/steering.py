@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from pulsetrainer.artefacts.session import BY_KEY
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.steps.conductor import Decide, Decision, Play, Rest
 from pulsetrainer.steps.quiz import Blind
@@ -63,15 +62,15 @@ class Steering:
         return decided
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What there is to say of a stop: that it was one, and where in a quiz."""
+    def stopped_by_key(self) -> str:
+        """Where a key stopped it, and in which question of a quiz; empty: none did, or all was answered."""
         quiz = self.programme
         if not self.stopped:
-            return ()
+            return ""
         if not isinstance(quiz, Blind):
-            return (f"{BY_KEY} before its end",)
+            return "stopped by key before its end"
         left = quiz.question < quiz.questions
-        return (f"{BY_KEY} in question {quiz.question + 1} of {quiz.questions}",) * left
+        return f"stopped by key in question {quiz.question + 1} of {quiz.questions}" * left
 
     def _changed(self, play: Play) -> Play:
         return replace(

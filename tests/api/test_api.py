@@ -168,6 +168,21 @@ def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
             "whole number from 2 to 500",
         ),
         (lambda *_: pt.read_table("x.csv"), "name of a column for input and for output"),
+        (lambda _, model: pt.invert("normal", model, force_max="20 N"), "`force_max` must be a number"),
+        (lambda _, model: pt.identify(None), "expected a Run, got None"),
+        (lambda diagnosis, _: pt.load(diagnosis), "`path` must name a file, got a Diagnosis"),
+        (lambda *_: pt.load(" "), "`path` must name a file, got ' '"),
+        (lambda *_: pt.capture("identification", "bench:"), "expected a device, got 'bench:'"),
+        (lambda *_: pt.tune("bench:"), "expected a device, got 'bench:'"),
+        (lambda _, model: pt.session(model, "bench:"), "expected a device, got 'bench:'"),
+        (lambda *_: pt.identify(pt.load(KEPT / "run.h5"), seed=-1), "`seed` must be a whole number, 0 or"),
+        (lambda _, model: pt.invert([0, 1, 2], model), "a pulse must be a name, .* got a list"),
+        (lambda _, model: pt.invert(([0, 1, 2, 3], [1, 2, 3, "x"]), model), "value must be numbers: "),
+        (
+            lambda _, model: pt.invert(([0, 1, 2, 3], [1, 2, 3, 4, 5]), model),
+            "needs one value for each time, got shapes",
+        ),
+        (lambda _, model: pt.invert(([0, 2, 1, 3], [1, 2, 3, 4]), model), "not increase: 1 s after 2 s"),
     ],
 )
 def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):

@@ -58,6 +58,12 @@ def test_bash_completes_commands_and_options(tmp_path):
     assert {"--out", "--overwrite", "--json"} <= set(completed(tmp_path, "pulsetrainer capture --"))
 
 
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_a_line_with_a_mistake_is_completed_all_the_same(tmp_path):
+    """What is wrong is told when it is run, not in the middle of the typing."""
+    assert completed(tmp_path, "pulsetrainer diagnose --model a --model b --qu") == ["--quick"]
+
+
 def on_terminal(folder: Path, *words: str, **more: str) -> bytes:
     """Return everything that a command writes to a terminal of its own."""
     environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}

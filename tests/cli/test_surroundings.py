@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 from test_screen import on_terminal
 
-from program import PROGRAM, cold, pulsetrainer
+from program import PROGRAM, Ran, cold, pulsetrainer
 from pulsetrainer.cli.guard import funnel
+from wording import refusal
 
 NOWHERE = "/proc/nowhere"  # cannot be made, by root neither
 SURROUNDINGS = {
@@ -98,6 +99,14 @@ def test_what_may_not_be_written_is_no_bug(monkeypatch):
     assert funnel(program, ["--install-completion"]) == 3
     assert "error: /home/x/.bashrc: Permission denied" in said.getvalue()
     assert "bug" not in said.getvalue()
+
+
+def test_a_folder_that_was_deleted_is_no_bug(tmp_path):
+    """The shell is still in it: no output can be written there."""
+    line = shlex.join([*PROGRAM, "capture", "identification", "-o", "out.h5"])
+    job = f"mkdir gone && cd gone && rmdir ../gone && {line}"
+    done = subprocess.run(["sh", "-c", job], cwd=tmp_path, capture_output=True, text=True)  # noqa: PLW1510
+    refusal(Ran(done.returncode, done.stdout, done.stderr), 3, "folder deleted")
 
 
 @pytest.mark.parametrize(
