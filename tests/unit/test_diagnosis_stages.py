@@ -384,6 +384,16 @@ def test_the_accepted_one_is_refitted_and_the_floor_estimated_anew(monkeypatch, 
     assert after.floor.asked is after.current
 
 
+@pytest.mark.parametrize(("name", "taken"), [("periodic", True), ("creep", False)])
+def test_a_hum_that_halves_do_not_predict_is_asked_of_whole_pieces(monkeypatch, name, taken):
+    """Halves of equal cycles are their two branches; a line is the same at all times."""
+    _refitting(monkeypatch, acceptance, squares={frozenset({name}): 399.0})
+    held_out = HeldOut(-1.0)
+    held_out.gain_told = lambda before, after, floor: 0.9
+    state = _state(_fit(500.0), held_out=held_out, trials=((_fit(400.0, name), _score(name, 1.0)),))
+    assert bool(acceptance.stage(state).current.terms) is taken
+
+
 def test_the_next_candidate_is_taken_where_the_best_does_not_predict(monkeypatch):
     """Best fit first; the one that only fits is passed over."""
     _refitting(monkeypatch, acceptance, squares={frozenset({"offset-drift"}): 300.0})
