@@ -254,8 +254,11 @@ class Unlisted(Cause):
         )
 
     def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
-        """Return the points of the curves."""
-        return [one for one in parameters if one.name != "tau"]
+        """Return none: weights and offset hold what all points have in common, so each of them may be zero.
+
+        What a curve predicts says that it is there: without that it is not found.
+        """
+        return ()
 
     def sign(self, name: str, polarity: int) -> int:
         """Return by what a parameter is multiplied when the output is: the curve is added to it."""

@@ -9,7 +9,7 @@ here: equal loops differ by nothing else that is known.
 What speaks against a cause that was found is written beside it:
 
 - it predicts blocks that were left out worse than the model without it;
-- the interval of its strength (of a learned curve: of all its points) spans zero;
+- the interval of its strength spans zero;
 - a parameter, its interval or the strength itself ends where the search did; a cause of the device that does
   so also where it takes away less than it leaves;
 - it is a hum in step with the input, most of which the weights would hold;
