@@ -157,15 +157,15 @@ def test_what_a_model_keeps_of_it_brings_it_back():
     assert (again.parts, same) == (cause.parts, values)
 
 
-# --- the whole --------------------------------------------------------------------------------------------
 def test_a_curve_each_point_of_which_may_be_zero_is_not_nothing():
-    """Weights and offset hold what its points have in common: a wide interval of each says nothing of them."""
+    """Weights and offset hold what its points have in common: a wide interval of each says nothing."""
     cause = Unlisted([Part(NAMES["input"], 0.0, 1.5, gain=True)])
     points = [Estimate(f"g{k}", 0.01 * k, "1", -0.1, 0.1) for k in range(2, KNOTS + 1)]
     parameters = [Estimate("tau", 0.4, "s", 0.3, 0.5), *points]
     assert not may_be_nothing(cause.strengths_of(parameters))
 
 
+# --- the whole --------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def dipping():
     """A device with a dip, its model and its diagnosis."""
