@@ -53,8 +53,8 @@ class Run(Shown):
     seam: Annotated[BoolArray | None, Data("1", "first sample after a pause", "time")] = None
     input_unit: str = "A"
     output_unit: str = "N"
-    input_quantity: str = "current"
-    output_quantity: str = "force"
+    input_quantity: str = ""  # current where it is not said and the unit is A, else input ...
+    output_quantity: str = ""  # ... force where the unit is N, else output
     signal: str = ""  # name of the excitation, or the imported file
     complete: bool = True
     dropped_samples: int = 0  # lost on the wire; the samples that are here are right
@@ -65,6 +65,10 @@ class Run(Shown):
     coil: Coil | None = None  # of a device that tells the duty
 
     def __post_init__(self) -> None:
+        if not self.input_quantity:
+            object.__setattr__(self, "input_quantity", "current" if self.input_unit == "A" else "input")
+        if not self.output_quantity:
+            object.__setattr__(self, "output_quantity", "force" if self.output_unit == "N" else "output")
         check_equal_length(self, ("time_s", "input", "output", "reference", "seam", "masked"))
         check_time(self)
 
