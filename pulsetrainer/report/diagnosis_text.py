@@ -23,6 +23,7 @@ ERRORS = (
     ("that model with the causes found", "extended_rms_percent", "extended_percent"),
     ("noise alone (averages: plus the levels)", "noise_percent", "floor_percent"),
 )
+IN_MODEL = "the model as given contains it already"
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
     "causes that look alike overlap; of one that was not found, a first estimate without a refit",
@@ -33,7 +34,8 @@ COLUMNS = {
 
 def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
-    how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found)
+    held = found.verdict in found.in_model
+    how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found) + (IN_MODEL,) * held
     yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
     if seen := unnamed(found):
         yield Facts(f"seen, but not named: {seen}, which is {too_little(found)}", {})

@@ -287,7 +287,7 @@ def diagnosed(found: Diagnosis) -> dict[str, Any]:
             }
             for one in found.causes
         ],
-        **picked(found, "lacks", "evidence", "next_experiment"),
+        **picked(found, "in_model", "lacks", "evidence", "next_experiment"),
     }
 
 
