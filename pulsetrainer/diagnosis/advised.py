@@ -105,17 +105,17 @@ ADVICE: Mapping[str, str] = {
     "extend, or late": (
         "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "
         "model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which "
-        "takes it out. Then test the model on another recording, one that was not fitted: pulsetrainer "
+        "takes it out. Then compare both models on another recording, one that was not fitted: pulsetrainer "
         "evaluate."
     ),
     "extend": (
-        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
-        "pulsetrainer evaluate."
+        "Extend the model with what was found, then compare both models on another recording, one that was "
+        "not fitted: pulsetrainer evaluate."
     ),
     "extend, correct": (
-        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
-        "pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that out of the "
-        "recording."
+        "Extend the model with what was found, then compare both models on another recording, one that was "
+        "not fitted: pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that "
+        "out of the recording."
     ),
     "rest first": (
         "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "
