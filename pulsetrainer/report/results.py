@@ -6,7 +6,6 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
-from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.names import digits, split, told
@@ -326,23 +324,10 @@ def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     now = {(cause, name): value for cause, several in added.items() for name, value in several.items()}
     if any(told.get(which, value) != value for which, value in now.items()):
         rows["parameters"] = (
-            "fitted again as the model is used, from rest; intervals are those of the diagnosis, and stand "
-            "only beside what did not change"
+            "fitted again as the model is used, from rest; the intervals hold this fit and that of the "
+            "diagnosis"
         )
     return rows
-
-
-def as_fitted_again(one: Extension, found: Diagnosis) -> Extension:
-    """Return an extension without the intervals of a diagnosis that told other values."""
-    told: dict[str, list[float]] = {}
-    for cause in found.found:
-        for p in cause.parameters if cause.cause == one.cause else ():
-            told.setdefault(p.name, []).append(p.value)
-    rows = (
-        p if p.value in told.get(p.name, [p.value]) else replace(p, lower=math.nan, upper=math.nan)
-        for p in one.parameters
-    )
-    return replace(one, parameters=tuple(rows))
 
 
 def _left(found: Diagnosis, model: Model) -> dict[str, str]:
