@@ -167,9 +167,11 @@ def explains(one: Cause, found: Diagnosis) -> float:
 def tells_shares(found: Diagnosis) -> bool:
     """Tell whether any cause has a share: not where nothing is beyond noise and nothing was fitted.
 
-    Those of a quick screen are first estimates, each as if it were alone: together they say nothing.
+    Those of a quick screen are first estimates, each as if it were alone: together they say nothing. Nor do
+    those of an error that is too small to matter.
     """
-    return not found.quick and any(math.isfinite(explains(one, found)) for one in found.causes)
+    small = found.verdict == "none" and not found.found
+    return not (found.quick or small) and any(math.isfinite(explains(one, found)) for one in found.causes)
 
 
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:

@@ -27,6 +27,7 @@ _VERDICT: Final = {True: "better", False: "worse", None: ""}
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
+_TOLD_PERCENT: Final = 0.001  # of an expected error: less is not told in figures
 _OF_A_FIT: Final = (
     "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
     "output_uncertainty", "offsets", "spacing", "stiffness", "loop", "masked_samples", "warning",
@@ -127,14 +128,15 @@ def inverted(out: Path, drive: Waveform) -> Said:
     if drive.predicted_peak > _MORE_BEFORE * drive.full_force:
         peak = f"{drive.predicted_peak:.3f} {drive.output_unit}"
         before = f"; up to {peak} in the strokes before the pulse, by the model"
-    full = "full force" if made == "force" else f"the top of the {made}"
+    error = drive.predicted_max_error_percent
+    most = f"at most {error:.3f}" if error >= _TOLD_PERCENT else f"under {_TOLD_PERCENT:g}"
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
         made: _range_words(force, drive.output_unit) + before,
         given: _range_words(current, drive.input_unit),
         "out of reach": counted(drive.clipped_samples, "sample"),
-        "expected error": f"at most {drive.predicted_max_error_percent:.3f} % of {full}, by the model{but}",
+        "expected error": f"{most} % of full {made}, by the model{but}",
     }
     return payload, f"{out}: {drive_title(drive)}", rows
 
