@@ -61,8 +61,14 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         yield Table("causes, strongest first", columns[:2], tuple(row[:2] for row in rows))
     if explained:
         yield Facts("in this table", explained)
-    yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
+    yield Facts("evidence", {str(k): text for k, text in enumerate(evidence(found), start=1)})
     yield Facts("next", {"": found.next_experiment})
+
+
+def evidence(found: Diagnosis) -> list[str]:
+    """Return the evidence, but for what stands word by word with a cause that was found."""
+    said = {f"{one.cause}: {one.text.removesuffix('.')}." for one in found.found}
+    return [line for line in found.evidence if line not in said]
 
 
 def in_doubt(found: Diagnosis) -> bool:

@@ -46,7 +46,7 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
         weight = records[k].sample_weight.copy()
         own = int(np.ceil(count / even.input.size * weight.size))
         step = weight.size / even.input.size  # less than that is only rounded otherwise
-        if count > LIMITS.first_stroke_most * even.input.size or weight[:own].sum() < max(step, 1.0):
+        if count > LIMITS.first_stroke_most * even.input.size or weight[:own].sum() <= max(step, 1.0):
             continue
         weight[:own] = 0.0
         records[k] = replace(records[k], sample_weight=weight)
