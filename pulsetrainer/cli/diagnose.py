@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
 from functools import partial
@@ -125,12 +126,14 @@ def _again(
 
 
 def _beside(path: Path, called: str) -> Path:
-    """Return a name in this folder that is like another one, and not taken; a second round numbers it."""
+    """Return a name in this folder that is like another one, and neither taken nor that one itself."""
     stem = re.sub(rf"-{called}(-\d+)?$", "", path.stem)
-    return free(Path(f"{stem}-{called}{path.suffix}"))
+    numbers = itertools.chain(("",), (f"-{number}" for number in itertools.count(2)))
+    names = (Path(f"{stem}-{called}{number}{path.suffix}") for number in numbers)
+    return next(one for one in names if one.name != path.name and not one.exists())
 
 
 def _extended(model: Path) -> Path:
     """Return a name in this folder for a model that is extended: ``a-extended`` of ``a-model``."""
     stem = model.stem.replace("model", "extended")
-    return free(Path(f"{stem if stem != model.stem else f'{stem}-extended'}.h5"))
+    return free(Path(f"{stem}.h5" if "extended" in stem else f"{stem}-extended.h5"))

@@ -70,7 +70,7 @@ ADVICE: Mapping[str, str] = {
     ),
     "none, correct": (
         "Nothing in this recording calls for another model: {names} can be seen, but no larger than the "
-        "noise. Use the model as it is. To take out the rest of it too, go on with pulsetrainer correct."
+        "noise. Use the model as it is. To take that out too, go on with pulsetrainer correct."
     ),
     "in the model": (
         "The model as given contains {names} already, and fitted again to these recordings it would be no "

@@ -142,7 +142,8 @@ def test_a_diagnosis_that_extends_the_model_sends_no_one_to_correct(folder):
     assert commands(changed) == commands(changed, own=False)
     assert [line.split()[1] for line in commands(changed)] == ["identify", "diagnose"]
     assert commands(replace(changed, records=2 * changed.records)) == []  # some may be those of the model
-    assert commands(fault, "a.h5")[1] == "pulsetrainer identify r-corrected.h5 -o a-corrected.h5"
+    for name, again in (("a", "a-corrected"), ("a-corrected", "a-corrected-2")):  # a second round, too
+        assert commands(fault, f"{name}.h5")[1] == f"pulsetrainer identify r-corrected.h5 -o {again}.h5"
     assert commands(fault, own=False)[1:] == [
         "pulsetrainer diagnose r-corrected.h5 --model a.h5 -o d-corrected.h5"
     ]
@@ -155,8 +156,13 @@ def test_the_way_on_overwrites_nothing(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("extended.h5", "r-corrected.h5", "a-corrected.h5"):
         (tmp_path / name).touch()
-    good, run, page = replace(fault, verdict="creep", extended=model), Path("r.h5"), Path("d.html")
-    for name, last in (("model", "extended-2"), ("a-model", "a-extended"), ("a", "a-extended")):
+    good, run, page = replace(fault, verdict="creep", extended=model), Path("r.h5"), Path("d-corrected.html")
+    for name, last in (
+        ("model", "extended-2"),
+        ("a-model", "a-extended"),
+        ("a", "a-extended"),
+        ("extended", "extended-2"),
+    ):
         (extend,) = next_commands(good, [run], Path(f"{name}.h5"), Path("d.h5"), own=True)
         assert extend.endswith(f"-o {last}.h5")
     bad = replace(fault, extended=None)
@@ -168,7 +174,10 @@ def test_the_way_on_overwrites_nothing(folder, tmp_path, monkeypatch):
     assert again == [
         f"pulsetrainer correct {run} --diagnosis {made} -o r-corrected-2.h5",
         "pulsetrainer identify r-corrected-2.h5 -o a-corrected-2.h5",
-        f"pulsetrainer diagnose r-corrected-2.h5 --model a-corrected-2.h5 -o {made} --html d-corrected.html",
+        (
+            "pulsetrainer diagnose r-corrected-2.h5 --model a-corrected-2.h5 -o d-corrected-2.h5 "
+            "--html d-corrected-2.html"
+        ),
     ]
 
 
