@@ -28,7 +28,7 @@ print(pt.evaluate(played))
 
 Verbs are pure functions from artefacts to artefacts: each command of the command line is one of them, with
 files around it, and both give the same bits. Artefacts are frozen dataclasses of numpy arrays with units in
-their fields' names or in `..._unit`. `print` shows one as the command does, a notebook adds its figure, and
+their fields' names or in `..._unit`. `print` shows one as `pulsetrainer show` does, a notebook adds its figure, and
 `.plot()` returns matplotlib axes. Errors are Python exceptions of one family, `pulsetrainer.errors`; wrong
 arguments are also `ValueError`. Nothing here prints, exits or reads the clock but `save`.
 

@@ -127,6 +127,7 @@ class Diagnosis(Shown):
     empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
         "nan"
     )
+    in_model: tuple[str, ...] = ()  # causes found that the model as given contains already
 
     @property
     def found(self) -> tuple[Cause, ...]:

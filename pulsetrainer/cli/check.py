@@ -66,11 +66,13 @@ def check(
 
 
 def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, *, updatable: bool) -> None:
+    from pulsetrainer.steps import check as limits
+
     kelvin, error = found.temperature_K, found.error_percent
     unknown = f"not known: {found.temperature_unknown}"
     rows = {
-        "offset": _said(found.offset, "N", 3),
-        "gain": _said(found.gain, "", 4),
+        "offset": _said(found.offset, "N", 3) + f"; {limits.OFFSET_N:g} N either way is still true",
+        "gain": _said(found.gain, "", 4) + f"; {limits.GAIN:g} either way is still true",
         "shape": _said(found.shape_percent, "% of the span", 2),
         "temperature": unknown if kelvin is None else _said(kelvin, "K against calibration", 1),
         "error": f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 import shlex
 from functools import partial
 from pathlib import Path
@@ -55,7 +57,7 @@ def diagnose(
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
         known = set(store.read_header(model).provenance.inputs.values())
         own = not known or bool(known & set(header.provenance.inputs.values()))
-        commands = next_commands(found, runs, model, out, own=own)
+        commands = next_commands(found, runs, model, out, own=own, html=html)
         if html is not None:
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
@@ -83,36 +85,55 @@ def _before_correction(runs: list[Path], measured: list[pt.Run], model: Path, kn
     ]
 
 
-def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path, *, own: bool) -> list[str]:
+def next_commands(
+    found: pt.Diagnosis, runs: list[Path], model: Path, out: Path, *, own: bool, html: Path | None = None
+) -> list[str]:
     """Return the commands to go on with: to extend the model, or to correct the runs and begin again.
 
     A model that was not identified from its ``own`` runs is not at fault, and stays, but for one of another
     condition. After a quick screen comes the full diagnosis. No command overwrites a file.
     """
     words: list[list[object]] = []
+    pages = (out, html) if html is not None else (out,)
     if found.next_command == "extend":  # fitted with all faults of the measurement taken out
-        words.append(["extend", out, "--model", model, "-o", free(Path("extended.h5"))])
+        words.append(["extend", out, "--model", model, "-o", _extended(model)])
     elif found.next_command == "correct":
         corrected = [_beside(run, "corrected") for run in runs]
         pairs = zip(runs, corrected, strict=True)
         words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
-        words += _again(corrected, model, out, "corrected", anew=own)
+        words += _again(corrected, model, pages, "corrected", anew=own)
     elif (
         found.verdict == _ANOTHER_CONDITION and len(found.records) == 1
     ):  # of several, some may be the model's
-        words += _again(runs, model, out, "anew", anew=True)
+        words += _again(runs, model, pages, "anew", anew=True)
     if not words and found.quick:
-        words.append(["diagnose", *runs, "--model", model, "-o", _beside(out, "full")])
+        words += _again(runs, model, pages, "full", anew=False)
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 
-def _again(runs: list[Path], model: Path, out: Path, called: str, *, anew: bool) -> list[list[object]]:
-    """Return the words that diagnose runs again, with a model identified ``anew`` from them or as it is."""
+def _again(
+    runs: list[Path], model: Path, pages: tuple[Path, ...], called: str, *, anew: bool
+) -> list[list[object]]:
+    """Return the words that diagnose runs again, with a model identified ``anew`` from them or as it is.
+
+    ``pages`` are the diagnosis that was written and, where one was wanted, its report.
+    """
     again = _beside(model, called) if anew else model
     words: list[list[object]] = [["identify", *runs, "-o", again]] if anew else []
-    return [*words, ["diagnose", *runs, "--model", again, "-o", _beside(out, called)]]
+    options = zip(("-o", "--html"), pages, strict=False)
+    made = [word for option, path in options for word in (option, _beside(path, called))]
+    return [*words, ["diagnose", *runs, "--model", again, *made]]
 
 
 def _beside(path: Path, called: str) -> Path:
-    """Return a name in this folder that is like another one, and not taken."""
-    return free(Path(f"{path.stem}-{called}.h5"))
+    """Return a name in this folder that is like another one, and neither taken nor that one itself."""
+    stem = re.sub(rf"-{called}(-\d+)?$", "", path.stem)
+    numbers = itertools.chain(("",), (f"-{number}" for number in itertools.count(2)))
+    names = (Path(f"{stem}-{called}{number}{path.suffix}") for number in numbers)
+    return next(one for one in names if one.name != path.name and not one.exists())
+
+
+def _extended(model: Path) -> Path:
+    """Return a name in this folder for a model that is extended: ``a-extended`` of ``a-model``."""
+    stem = model.stem.replace("model", "extended")
+    return free(Path(f"{stem}.h5" if "extended" in stem else f"{stem}-extended.h5"))

@@ -32,7 +32,6 @@ def extend(
     inputs = (diagnosis, model, *([] if verify is None else [verify]))
     job = Job(context, inputs=inputs, outputs=(out,))
     from pulsetrainer.report.facts import extension_words
-    from pulsetrainer.report.results import as_fitted_again
     from pulsetrainer.report.results import extended as extended_by
 
     with job.working("extending"):
@@ -49,7 +48,7 @@ def extend(
         job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
     job.show(*extended_by(out, extended, found, verify, proof))
     for one in extended.extensions:
-        job.screen.facts(f"with {one.cause}", extension_words(as_fitted_again(one, found)))
+        job.screen.facts(f"with {one.cause}", extension_words(one))
 
 
 def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:

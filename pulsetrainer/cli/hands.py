@@ -15,6 +15,8 @@ from pulsetrainer.steps.programme import Programme
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.steering import Steering
 
+_SAID_S = 3.0  # so long the screen shows what a key did: until after the beats that were on their way
+
 
 @dataclass(frozen=True, slots=True)
 class Steered:
@@ -60,17 +62,27 @@ class Hands:
         if isinstance(chosen, Blind):
             return self._asked(chosen, by_key=by_key)
         steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
-        said = ""
+        said, until_s = "", 0.0
 
-        def press(key: str, _s: float) -> None:
-            nonlocal said
-            said = steering.press(key)
+        def press(key: str, at_s: float) -> None:
+            nonlocal said, until_s
+            said, until_s = steering.press(key) or self._asked_for(steering, key), at_s + _SAID_S
+
+        def status(at_s: float) -> str:
+            return "; ".join(["paused"] * steering.paused + [said] * (said != "" and at_s < until_s))
 
         live = Live(press, self.names, blind=False)
-        live.status = lambda: "; ".join(filter(None, ("paused" if steering.paused else "", said)))
+        live.status = status
         return Steered(
             steering, lambda time_s: chosen.share_at(steering.without_pauses(time_s)), live, by_key=True
         )
+
+    def _asked_for(self, steering: Steering, key: str) -> str:
+        """Return what the keys asked for: the screen shows it before it is pressed."""
+        pulse = "" if steering.pulse is None else self.names[steering.pulse]
+        rate = "" if steering.rate is None else f"{steering.rate:.0f}/min"
+        height = "" if steering.amplitude is None else f"{100 * steering.amplitude:.0f} %"
+        return "" if key in " q" else "next: " + "  ".join(filter(None, (pulse, rate, height)))
 
     def _asked(self, quiz: Blind, *, by_key: bool) -> Steered:
         """Return a quiz on the screen: a letter answers, Q stops."""
@@ -88,7 +100,7 @@ class Hands:
                 steering.press("q")
 
         live = Live(press, self.names, blind=True)
-        live.status = lambda: (
+        live.status = lambda _s: (
             f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
             + (
                 ", answered"

@@ -43,7 +43,7 @@ class Live:
         self._traces: deque[np.ndarray] = deque()
         self._show: Callable[[RenderableType], None] = lambda _text: None
         self._drawn_s, self._share = -1.0, 0.0
-        self.status: Callable[[], str] = lambda: ""
+        self.status: Callable[[float], str] = lambda _s: ""  # at a time of the session, s
 
     def __call__(self, now: Now) -> None:
         """Take the keys that were pressed, and draw."""
@@ -64,7 +64,7 @@ class Live:
 
         if self._blind:
             choices = "  ".join(f"{letter} {name}" for letter, name in zip(LETTERS, self._names))  # noqa: B905
-            return Text(f"{self.status()}\n{choices}  Q stop")
+            return Text(f"{self.status(now.time_s)}\n{choices}  Q stop")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
         force = np.concatenate(self._traces)
         lines = plotted(force, width, _ROWS)
@@ -77,7 +77,8 @@ class Live:
         elif beat is not None:
             rate = 60.0 / now.interval_s
             said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"
-        return Text("\n".join([*lines, said, self.status(), keys_in(width)]), no_wrap=True, overflow="crop")
+        lines += [said, self.status(now.time_s), keys_in(width)]
+        return Text("\n".join(lines), no_wrap=True, overflow="crop")
 
     def _progress(self, share: float) -> None:
         self._share = share

@@ -38,7 +38,8 @@ _NEXT = {
     ("waveform", "run"): "run `pulsetrainer identify {file} -o model.h5`, "
     "then `pulsetrainer invert normal --model model.h5 -o drive.h5`",
     ("waveform", "playback"): "it was played already: give the drive file it was played from",
-    ("playback", "waveform"): "run `pulsetrainer play {file} -o played.h5`",
+    ("playback", "waveform"): "run `pulsetrainer play {file} -o played.h5`; "
+    "if your own amplifier played it, import what was measured, and evaluate that with --model",
     ("playback", "model"): "run `pulsetrainer invert normal --model {file} -o drive.h5`, "
     "then `pulsetrainer play drive.h5 -o played.h5`",
     ("playback", "evaluation"): "it was evaluated already: see `pulsetrainer show {file}`",

@@ -105,7 +105,7 @@ def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> N
 
     job.notes(found.notes)
     if out is None:
-        job.notes(["the loop gains are not kept: give `out` pulsetrainer.toml to write them down"])
+        job.notes(["the loop gains are not kept: give -o pulsetrainer.toml to write them down"])
     before, after = found.tracking_percent.before, found.tracking_percent.after
     job.show(
         plain(found) | {"output": out},
@@ -117,6 +117,7 @@ def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> N
             "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
             "tracking": f"{after:.2f} % of the range at worst"
             + ("" if before is None else f", {before:.2f} % before"),
-            "step": f"settled after {found.settle_ms:.1f} ms, overshoot {found.overshoot_percent:.1f} %",
+            "step": f"settled after {found.settle_ms:.1f} ms, overshoot {found.overshoot_percent:.1f} %; "
+            "no pulse has such a step",
         },
     )

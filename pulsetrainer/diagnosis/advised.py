@@ -23,6 +23,25 @@ KNOWN = (
     " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
     "record the same again, and identify the model from that."
 )
+# what can be done about a fault of the measurement, said with advice that does not say so itself
+ALSO = " Before that, take {removed} out of the recording (pulsetrainer correct), and diagnose what is left."
+# ... of tied causes, none of which is the device's; and if its frequency is one of the mains
+WHICHEVER = (
+    "Be it {either}, it does not belong in a model of the device: take {removed} out of the recording "
+    "(pulsetrainer correct), and go on with the corrected one: it is right either way, but for what the "
+    "causes differ by. "
+)
+MAINS = "{mains:.4g} Hz is a frequency of the mains, so a hum is likely. "
+# of tied causes, beside a model that was extended by what was found
+EXTENDED = (
+    "Extend the model as it is (pulsetrainer extend): be it {either}, it then predicts recordings like these "
+    "better. "
+)
+# of records without time
+RATE = (
+    "If the samples were taken at a constant rate, no new recording is needed: read the table again with "
+    "pulsetrainer import --rate HZ."
+)
 # after what can be done with the records as they are
 LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
 ADVICE: Mapping[str, str] = {
@@ -48,6 +67,14 @@ ADVICE: Mapping[str, str] = {
     "none, seen": (
         "Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger "
         "than the noise. Use the model as it is."
+    ),
+    "none, correct": (
+        "Nothing in this recording calls for another model: {names} can be seen, but no larger than the "
+        "noise. Use the model as it is. To take that out too, go on with pulsetrainer correct."
+    ),
+    "in the model": (
+        "The model as given contains {names} already, and fitted again to these recordings it would be no "
+        "better: use it as it is."
     ),
     "none, small": (
         "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
@@ -78,17 +105,17 @@ ADVICE: Mapping[str, str] = {
     "extend, or late": (
         "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "
         "model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which "
-        "takes it out. Then test the model on another recording, one that was not fitted: pulsetrainer "
+        "takes it out. Then compare both models on another recording, one that was not fitted: pulsetrainer "
         "evaluate."
     ),
     "extend": (
-        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
-        "pulsetrainer evaluate."
+        "Extend the model with what was found, then compare both models on another recording, one that was "
+        "not fitted: pulsetrainer evaluate."
     ),
     "extend, correct": (
-        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
-        "pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that out of the "
-        "recording."
+        "Extend the model with what was found, then compare both models on another recording, one that was "
+        "not fitted: pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that "
+        "out of the recording."
     ),
     "rest first": (
         "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "
@@ -136,6 +163,8 @@ ADVICE: Mapping[str, str] = {
         "a Preisach model may not describe this device."
     ),
 }
+_TIED = ("tied", "tied, no better")
+_SAYS_CORRECT = ("correct", "correct, extend", "extend, correct", "extend, or late", "none, correct")
 OURS = (
     " The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} "
     "-o diagnostic-2.h5."
@@ -252,22 +281,29 @@ class Bench:
         return with_seconds(seconds * self.scale.second)
 
 
-def advice(one: Evidence, bench: Bench) -> str:
-    """Return what to measure next, as a sentence, in numbers of the bench."""
+def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str] = ()) -> str:
+    """Return what to measure next, as a sentence, in numbers of the bench.
+
+    ``command`` is what goes on with the recordings as they are, and ``removed`` what `correct` takes out.
+    """
     faster = one.figures.get("faster", 1.0)
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
-    lacked, told = [name for name in names if name in LACKS], ADVICE[one.kind]
-    if lacked and "{missing}" not in told:
-        told += LATER
+    lacked = [name for name in names if name in LACKS]
     faults = [name for name in names if name not in LACKS and library()[name].corrects]
-    if one.kind in ("tied", "tied, no better") and 0 < len(faults) < len(names):
-        told += KNOWN
-    return told.format(
+    if one.kind in _TIED:
+        begins = EXTENDED if command == "extend" else WHICHEVER if command == "correct" else ""
+        told = (MAINS if "mains" in one.figures else "") + begins + ADVICE[one.kind]
+        told += KNOWN if 0 < len(faults) < len(names) else ""
+    else:
+        told = ADVICE[one.kind] + (ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else "")
+    return _with_what_lacks(told, lacked).format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
         lacked=listed(lacked, numbers),
+        either=" or ".join(names),
+        removed=listed(removed, numbers),
         faults=listed(faults, numbers),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         lasting=bench.lasting(one.names[0], faster) if tied else "",
@@ -275,3 +311,11 @@ def advice(one: Evidence, bench: Bench) -> str:
         command=(OURS if bench.ours else TABLE).format(**numbers),
         **{name: bench.time(value) if name == "rest" else value for name, value in one.figures.items()},
     )
+
+
+def _with_what_lacks(told: str, lacked: Sequence[str]) -> str:
+    """Return advice with what to do about what the records lack, where it does not say so itself."""
+    later = LATER if lacked and "{missing}" not in told else ""
+    if "time" not in lacked:
+        return told + later
+    return f"{told}{later} {RATE}" if later else f"{RATE} {told}"

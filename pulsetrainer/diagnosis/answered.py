@@ -48,7 +48,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     problem, model = state.problem, given.model
     scale = state.scale
     percent = PERCENT / float(np.ptp(problem.measured))
-    of_samples = PERCENT / float(np.ptp(np.concatenate([r.output[r.counts] for r in problem.records])))
+    of_samples = scale.span * percent_of_samples(state)
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
@@ -65,7 +65,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     )
     sign, words = model.polarity, _words(given) | bench.numbers()
     dependences = learned(state, words)
-    return Diagnosis(
+    found = Diagnosis(
         verdict=state.verdict,
         quick=state.question.quick,
         rms=rms,
@@ -79,7 +79,7 @@ def diagnosis_of(state: State) -> Diagnosis:
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
         evidence=_said(model, [wording.sentence(one, words) for one in state.evidence]),
-        next_experiment=advised.advice(_advice(state), bench),
+        next_experiment="",
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
@@ -110,7 +110,10 @@ def diagnosis_of(state: State) -> Diagnosis:
         polarity=sign,
         as_measured=True,
         empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
+        in_model=state.in_model,
     )
+    said = advised.advice(_advice(state), bench, found.next_command, found.correctable)
+    return replace(found, next_experiment=said)
 
 
 def _advice(state: State) -> Evidence:
@@ -119,6 +122,8 @@ def _advice(state: State) -> Evidence:
     if state.question.quick and one.kind.startswith("extend"):
         return replace(one, kind="extend, quick")
     seen = tuple(dict.fromkeys(finding.cause.id for finding in state.findings if finding.found))
+    if one.kind == "none" and state.correctable:
+        return Evidence("none, correct", names=(*state.correctable, *one.names))
     if one.kind == "none" and seen:
         return Evidence("none, seen", names=(*seen, *one.names))
     if one.kind == "none" and tried and tried[0].p_value <= LIMITS.p_max:
@@ -198,6 +203,12 @@ def undone(state: State) -> list[FloatArray]:
         at = own.step * np.arange(own.output.size) if stamps is None else stamps - stamps[0]
         found.append(np.interp(at, seconds, effect))
     return found
+
+
+def percent_of_samples(state: State) -> float:
+    """Return what makes an error of single samples, in the unit of the output, per cent of their span."""
+    outputs = np.concatenate([one.output[one.counts] for one in state.problem.records])
+    return PERCENT / (state.scale.span * float(np.ptp(outputs)))
 
 
 def _noise_of(state: State) -> float:

@@ -217,6 +217,14 @@ class State:
         return [term for term in self.repeated.terms if term.cause.lasting]
 
     @property
+    def in_model(self) -> tuple[str, ...]:
+        """Ids of the causes found that the model as given contains already, as well as they can be told."""
+        said = next((one.names for one in self.evidence if one.kind == "in the model"), ())
+        return tuple(
+            name for name in said if any(one.found and one.cause.id == name for one in self.findings)
+        )
+
+    @property
     def correctable(self) -> list[str]:
         """Ids of the faults of the measurement that can be taken out of a record: found, and not in doubt.
 

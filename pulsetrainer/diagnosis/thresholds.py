@@ -261,6 +261,9 @@ class Thresholds:
     first_stroke_most: float = 0.25  # of a record: more is no first stroke, and is not given up for one
 
     # Words
+    mains_Hz: tuple[float, float] = (50.0, 60.0)  # of all grids, but for railways
+    mains_within: float = 0.01  # of them: what EN 50160 allows in all but half a per cent of a year
+    mains_harmonics: int = 3  # of higher ones so many lie close together that any line is near one
     told_digits: int = 3  # significant, of rates and widths
     plain_digits: int = 6  # a number of fewer digits before its point is told without an exponent
     told_to: float = 0.02  # of the range: levels to be set are told to the power of ten below

@@ -130,6 +130,11 @@ TEXTS: Mapping[str, str] = {
         "than as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to "
         "it."
     ),
+    "in the model": (
+        "The model as given contains {names} already. Fitted again to these recordings and started from "
+        "rest, it would leave {extended:.3g} % of the span (rms of single samples); as given it leaves "
+        "{given:.3g} %. So nothing is added to it."
+    ),
     "no better": (
         "Extended by {names} and started from rest, the model would predict these recordings worse than as "
         "it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."

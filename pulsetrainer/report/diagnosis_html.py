@@ -8,7 +8,7 @@ from typing import Any
 from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_text
 from pulsetrainer.report.diagnosis_figures import ranked
-from pulsetrainer.report.diagnosis_text import in_doubt, too_little, unnamed
+from pulsetrainer.report.diagnosis_text import IN_MODEL, in_doubt, too_little, unnamed
 from pulsetrainer.report.html import page
 
 
@@ -51,4 +51,5 @@ def headline(found: Diagnosis) -> str:
     rest = "" if found.left.whole else ". Something else is left"
     named = ", ".join(dict.fromkeys([cause.cause + tied, *also]))  # each once
     named = named.replace("unlisted", "a dependence in no list")
-    return f"{words}: {named}{rest}."
+    held = f"; {IN_MODEL}" if found.verdict in found.in_model else ""
+    return f"{words}: {named}{held}{rest}."

@@ -23,6 +23,7 @@ ERRORS = (
     ("that model with the causes found", "extended_rms_percent", "extended_percent"),
     ("noise alone (averages: plus the levels)", "noise_percent", "floor_percent"),
 )
+IN_MODEL = "the model as given contains it already"
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
     "causes that look alike overlap; of one that was not found, a first estimate without a refit",
@@ -33,7 +34,8 @@ COLUMNS = {
 
 def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
-    how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found)
+    held = found.verdict in found.in_model
+    how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found) + (IN_MODEL,) * held
     yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
     if seen := unnamed(found):
         yield Facts(f"seen, but not named: {seen}, which is {too_little(found)}", {})
@@ -59,8 +61,14 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         yield Table("causes, strongest first", columns[:2], tuple(row[:2] for row in rows))
     if explained:
         yield Facts("in this table", explained)
-    yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
+    yield Facts("evidence", {str(k): text for k, text in enumerate(evidence(found), start=1)})
     yield Facts("next", {"": found.next_experiment})
+
+
+def evidence(found: Diagnosis) -> list[str]:
+    """Return the evidence, but for what stands word by word with a cause that was found."""
+    said = {f"{one.cause}: {one.text.removesuffix('.')}." for one in found.found}
+    return [line for line in found.evidence if line not in said]
 
 
 def in_doubt(found: Diagnosis) -> bool:
@@ -165,9 +173,11 @@ def explains(one: Cause, found: Diagnosis) -> float:
 def tells_shares(found: Diagnosis) -> bool:
     """Tell whether any cause has a share: not where nothing is beyond noise and nothing was fitted.
 
-    Those of a quick screen are first estimates, each as if it were alone: together they say nothing.
+    Those of a quick screen are first estimates, each as if it were alone: together they say nothing. Nor do
+    those of an error that is too small to matter.
     """
-    return not found.quick and any(math.isfinite(explains(one, found)) for one in found.causes)
+    small = found.verdict == "none" and not found.found
+    return not (found.quick or small) and any(math.isfinite(explains(one, found)) for one in found.causes)
 
 
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:

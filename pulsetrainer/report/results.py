@@ -6,7 +6,6 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +13,6 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
-from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.names import digits, split, told
@@ -29,6 +27,7 @@ _VERDICT: Final = {True: "better", False: "worse", None: ""}
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
+_TOLD_PERCENT: Final = 0.001  # of an expected error: less is not told in figures
 _OF_A_FIT: Final = (
     "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
     "output_uncertainty", "offsets", "spacing", "stiffness", "loop", "masked_samples", "warning",
@@ -129,14 +128,15 @@ def inverted(out: Path, drive: Waveform) -> Said:
     if drive.predicted_peak > _MORE_BEFORE * drive.full_force:
         peak = f"{drive.predicted_peak:.3f} {drive.output_unit}"
         before = f"; up to {peak} in the strokes before the pulse, by the model"
-    full = "full force" if made == "force" else f"the top of the {made}"
+    error = drive.predicted_max_error_percent
+    most = f"at most {error:.3f}" if error >= _TOLD_PERCENT else f"under {_TOLD_PERCENT:g}"
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
         made: _range_words(force, drive.output_unit) + before,
         given: _range_words(current, drive.input_unit),
         "out of reach": counted(drive.clipped_samples, "sample"),
-        "expected error": f"at most {drive.predicted_max_error_percent:.3f} % of {full}, by the model{but}",
+        "expected error": f"{most} % of full {made}, by the model{but}",
     }
     return payload, f"{out}: {drive_title(drive)}", rows
 
@@ -287,7 +287,7 @@ def diagnosed(found: Diagnosis) -> dict[str, Any]:
             }
             for one in found.causes
         ],
-        **picked(found, "lacks", "evidence", "next_experiment"),
+        **picked(found, "in_model", "lacks", "evidence", "next_experiment"),
     }
 
 
@@ -326,23 +326,10 @@ def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     now = {(cause, name): value for cause, several in added.items() for name, value in several.items()}
     if any(told.get(which, value) != value for which, value in now.items()):
         rows["parameters"] = (
-            "fitted again as the model is used, from rest; intervals are those of the diagnosis, and stand "
-            "only beside what did not change"
+            "fitted again as the model is used, from rest; the intervals hold this fit and that of the "
+            "diagnosis"
         )
     return rows
-
-
-def as_fitted_again(one: Extension, found: Diagnosis) -> Extension:
-    """Return an extension without the intervals of a diagnosis that told other values."""
-    told: dict[str, list[float]] = {}
-    for cause in found.found:
-        for p in cause.parameters if cause.cause == one.cause else ():
-            told.setdefault(p.name, []).append(p.value)
-    rows = (
-        p if p.value in told.get(p.name, [p.value]) else replace(p, lower=math.nan, upper=math.nan)
-        for p in one.parameters
-    )
-    return replace(one, parameters=tuple(rows))
 
 
 def _left(found: Diagnosis, model: Model) -> dict[str, str]:

@@ -80,16 +80,17 @@ def extend(
 
 def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
     """Say why a diagnosis has nothing to extend a model by, and what to do."""
-    why = (
-        "only screened for causes and fitted none"
-        if diagnosis.quick
-        else f"ended with the verdict {diagnosis.verdict!r} and found nothing that would hold in other runs"
-    )
+    if diagnosis.quick:
+        why = "only screened for causes and fitted none"
+    elif diagnosis.verdict in diagnosis.in_model:
+        why = f"found {' and '.join(diagnosis.in_model)}, which the model contains already"
+    else:
+        why = f"ended with the verdict {diagnosis.verdict!r} and found nothing that would hold in other runs"
     if diagnosis.correctable:
         hint = "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"
     elif diagnosis.quick:
         hint = "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o full.h5"
-    elif diagnosis.verdict == "none" or not diagnosis.next_experiment:
+    elif diagnosis.verdict in ("none", *diagnosis.in_model) or not diagnosis.next_experiment:
         hint = "use the model as it is"
     else:
         hint = f"follow the advice of the diagnosis: {diagnosis.next_experiment}"

@@ -64,7 +64,7 @@ def plan(
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
     drives = np.stack((drive.compensated, drive.scaled))
-    check_peak(drives, rehearsal.current_A)
+    check_peak(drives, rehearsal.current_A, hint=_elsewhere(drive))
     if _is_remade(drive, track_heat):
         coil_of(drive.model, asked=track_heat)
     for _ in range(repeats):
@@ -123,7 +123,8 @@ def play(
     (True, 1)
     """
     _check(drive, repeats)
-    check_peak(np.concatenate((drive.compensated, drive.scaled)), device.info.current_limit_A)
+    drives = np.concatenate((drive.compensated, drive.scaled))
+    check_peak(drives, device.info.current_limit_A, hint=_elsewhere(drive))
     tracked = _Tracked.of(drive, device, track_heat)
     check_force(drive.compensated, drive.rate_Hz, device.info.force_limit_N, drive.predicted)
     check_force(drive.scaled, drive.rate_Hz, device.info.force_limit_N)
@@ -237,8 +238,17 @@ def check_drive(drive: Waveform) -> None:
         raise DataError(
             f"the drive {drive.name} is of a device from {drive.input_unit} to {drive.output_unit}; this one "
             "takes a current in A and gives a force in N",
-            hint="identify and invert a run that was captured on the device",
+            hint=f"identify and invert a run that was captured on the device; {_EXPORT}",
         )
+
+
+_EXPORT = "for an amplifier of your own, pulsetrainer export writes the drive as a table"
+
+
+def _elsewhere(drive: Waveform) -> str:
+    """Say where a drive for another device is played; empty where it may be for ours."""
+    imported = drive.model is not None and not drive.model.captured
+    return f"if its model is of another device, play it there: {_EXPORT}" if imported else ""
 
 
 @dataclass(frozen=True, slots=True)

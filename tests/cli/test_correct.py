@@ -142,9 +142,8 @@ def test_a_diagnosis_that_extends_the_model_sends_no_one_to_correct(folder):
     assert commands(changed) == commands(changed, own=False)
     assert [line.split()[1] for line in commands(changed)] == ["identify", "diagnose"]
     assert commands(replace(changed, records=2 * changed.records)) == []  # some may be those of the model
-    for name in ("a", "a-corrected"):  # a second round overwrites nothing
-        again = f"{name}-corrected.h5"
-        assert commands(fault, f"{name}.h5")[1] == f"pulsetrainer identify r-corrected.h5 -o {again}"
+    for name, again in (("a", "a-corrected"), ("a-corrected", "a-corrected-2")):  # a second round, too
+        assert commands(fault, f"{name}.h5")[1] == f"pulsetrainer identify r-corrected.h5 -o {again}.h5"
     assert commands(fault, own=False)[1:] == [
         "pulsetrainer diagnose r-corrected.h5 --model a.h5 -o d-corrected.h5"
     ]
@@ -155,14 +154,31 @@ def test_the_way_on_overwrites_nothing(folder, tmp_path, monkeypatch):
     model = pt.Model(np.linspace(0.0, 1.0, 3), np.ones(3), 0.0, np.ones(3, bool))
     fault = pt.load(folder / "diagnosis.h5")
     monkeypatch.chdir(tmp_path)
-    for name in ("extended.h5", "r-corrected.h5"):
+    for name in ("extended.h5", "r-corrected.h5", "a-corrected.h5"):
         (tmp_path / name).touch()
-    (extend,) = next_commands(
-        replace(fault, verdict="creep", extended=model), [Path("r.h5")], Path("a.h5"), Path("d.h5"), own=True
-    )
-    assert extend.endswith("-o extended-2.h5")
-    lines = next_commands(replace(fault, extended=None), [Path("r.h5")], Path("a.h5"), Path("d.h5"), own=True)
+    good, run, page = replace(fault, verdict="creep", extended=model), Path("r.h5"), Path("d-corrected.html")
+    for name, last in (
+        ("model", "extended-2"),
+        ("a-model", "a-extended"),
+        ("a", "a-extended"),
+        ("extended", "extended-2"),
+    ):
+        (extend,) = next_commands(good, [run], Path(f"{name}.h5"), Path("d.h5"), own=True)
+        assert extend.endswith(f"-o {last}.h5")
+    bad = replace(fault, extended=None)
+    lines = next_commands(bad, [run], Path("a.h5"), Path("d.h5"), own=True)
     assert [line.count("r-corrected-2.h5") for line in lines] == [1, 1, 1]
+    # a second round does not add to the names, and makes a report where the first one did
+    run, made = Path("r-corrected.h5"), Path("d-corrected.h5")
+    again = next_commands(bad, [run], Path("a-corrected.h5"), made, own=True, html=page)
+    assert again == [
+        f"pulsetrainer correct {run} --diagnosis {made} -o r-corrected-2.h5",
+        "pulsetrainer identify r-corrected-2.h5 -o a-corrected-2.h5",
+        (
+            "pulsetrainer diagnose r-corrected-2.h5 --model a-corrected-2.h5 -o d-corrected-2.h5 "
+            "--html d-corrected-2.html"
+        ),
+    ]
 
 
 def test_a_model_of_the_run_before_it_was_corrected_is_told(folder):

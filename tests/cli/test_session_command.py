@@ -463,6 +463,27 @@ def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     assert "━".encode() not in terminal.seen
 
 
+def test_a_key_that_was_taken_is_shown_and_goes_again(tmp_path):
+    """Nothing said so until its beat came, and it was pressed again; 'x' stayed to the end."""
+    words = ("--pulses", "normal,bifid", "--rate", 100, "--minutes", 10)
+    terminal = Terminal(tmp_path, *SHORT, *words, port=FAST)
+    terminal.until(lambda: b"/min" in terminal.seen)
+    for key, answer in {"p": b"next: bifid", "<": b"next: bifid  90 %", "x": b"'x' is not"}.items():
+        terminal.press(key)
+        terminal.until(lambda answer=answer: answer in terminal.seen)
+
+    def time_s() -> float:
+        return float(re.findall(rb"([\d.]+) s ", terminal.seen)[-1])
+
+    pressed_s = time_s()
+    terminal.until(lambda: time_s() > pressed_s + 4.0)
+    mark = len(terminal.seen)
+    terminal.until(lambda: time_s() > pressed_s + 5.0)
+    assert b"'x'" not in terminal.seen[mark:]
+    terminal.press("q")
+    assert terminal.end() == 0
+
+
 def test_a_pause_does_not_eat_the_session(tmp_path):
     """As many beats as without, never more than 100 %; a key that changes nothing is answered."""
     terminal = Terminal(tmp_path, *SHORT, "--minutes", 0.5, port=FAST)

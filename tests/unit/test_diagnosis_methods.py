@@ -845,6 +845,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
             "given",
             "refitted",
             "left_out",
+            "mains",
         ],
         1.25,
     )
@@ -859,7 +860,8 @@ def test_every_kind_of_evidence_and_advice_has_words():
             said = advised.advice(Evidence(kind, figures=figures, names=names), bench)
             assert "{" not in said
             assert ("delay, creep and step" in said) is (
-                kind.startswith(("tied", "none, s"))
+                kind.startswith(("tied", "none, s", "none, c"))
+                or kind == "in the model"
                 or kind in ("inconclusive", "too noisy", "far too noisy", "correct")
                 or kind in ("extend, correct", "correct, extend")
             )
@@ -929,6 +931,22 @@ def test_what_can_be_done_now_comes_before_what_to_record(kind):
     assert "record output and input again" in both
 
 
+@pytest.mark.parametrize("kind", list(advised.ADVICE))
+@pytest.mark.parametrize("command", ["", "correct", "extend"])
+def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
+    """`next` sent to the bench, or to use the model as it is, and `then` to correct the recording."""
+    names = (*["heating"][: kind == "tied"], "periodic", "clock-skew")
+    one = Evidence(kind, figures={"there": 1, "here": 1, "rest": 1, "matters": 1, "times": 2}, names=names)
+    said = advised.advice(one, advised.Bench(Scale(), "A"), command, ["outliers", "periodic"])
+    if command == "correct":
+        assert "pulsetrainer correct" in said
+    if kind in ("tied", "tied, no better"):
+        assert ("outliers and periodic out" in said) is (command == "correct")
+        assert ("pulsetrainer extend" in said) is (command == "extend")
+        at_50 = replace(one, figures={**one.figures, "mains": 50.02})
+        assert "50.02 Hz" in advised.advice(at_50, advised.Bench(Scale(), "A"), command, ["periodic"])
+
+
 @pytest.mark.parametrize("kind", ["tied", "tied, no better"])
 @pytest.mark.parametrize(
     ("names", "known"),
@@ -944,6 +962,18 @@ def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
     named = ("heating", *names) if kind == "tied" else names
     said = advised.advice(Evidence(kind, figures=figures, names=named), advised.Bench(Scale(), "A"))
     assert ("If you know that it is the measurement (offset-drift)" in said) is known
+
+
+@pytest.mark.parametrize(("kind", "first"), [("lacks", True), ("none", False), ("extend", False)])
+def test_a_recording_without_time_may_only_need_its_rate(kind, first):
+    """It sent back to the bench, where `import --rate` is enough."""
+    timed, untimed = (
+        advised.advice(Evidence(kind, names=names), advised.Bench(Scale(), "A", timed=False))
+        for names in (("holds",), ("time",))
+    )
+    assert "--rate HZ" not in timed
+    assert untimed.startswith("If the samples were taken at a constant rate") is first
+    assert untimed.endswith("--rate HZ.") is not first
 
 
 def test_two_rates_that_count_as_one_are_not_told_as_one():
@@ -1055,23 +1085,27 @@ def test_the_records_of_a_question_are_called_as_the_runs_were_named():
 
 
 @pytest.mark.parametrize(
-    ("kind", "quick", "found", "p", "told"),
+    ("kind", "quick", "found", "p", "told", "correctable"),
     [
-        ("extend", True, (), None, "extend, quick"),
-        ("extend, or late", True, (), None, "extend, quick"),
-        ("extend", False, (), None, "extend"),
-        ("none", False, ("periodic",), None, "none, seen"),
-        ("none", False, (), 0.5 * LIMITS.p_max, "none, small"),
-        ("none", True, (), 0.5 * LIMITS.p_max, "none, small, quick"),
-        ("none", False, (), 2.0 * LIMITS.p_max, "none"),
-        ("none", True, (), 2.0 * LIMITS.p_max, "none, quick"),
-        ("lacks", True, (), 0.5 * LIMITS.p_max, "lacks"),
+        ("extend", True, (), None, "extend, quick", ()),
+        ("extend, or late", True, (), None, "extend, quick", ()),
+        ("extend", False, (), None, "extend", ()),
+        ("none", False, ("periodic",), None, "none, seen", ()),
+        ("none", False, ("periodic",), None, "none, correct", ("periodic",)),
+        ("none", False, (), 0.5 * LIMITS.p_max, "none, small", ()),
+        ("none", True, (), 0.5 * LIMITS.p_max, "none, small, quick", ()),
+        ("none", False, (), 2.0 * LIMITS.p_max, "none", ()),
+        ("none", True, (), 2.0 * LIMITS.p_max, "none, quick", ()),
+        ("lacks", True, (), 0.5 * LIMITS.p_max, "lacks", ()),
     ],
 )
-def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(kind, quick, found, p, told):
+def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(
+    kind, quick, found, p, told, correctable
+):
     """It sent to extend a model that there was not, and said that nothing was found where something was."""
     state = SimpleNamespace(
         advice=Evidence(kind),
+        correctable=correctable,
         question=SimpleNamespace(quick=quick),
         findings=[Finding(CAUSE[name], True) for name in found],
         scores=SimpleNamespace(
@@ -1080,7 +1114,7 @@ def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(kind, quick
     )
     one = answered._advice(state)
     assert one.kind == told
-    if told in ("none, seen", "none, small", "none, small, quick"):
+    if told in ("none, seen", "none, correct", "none, small", "none, small, quick"):
         assert one.names == (found or ("creep",))
 
 

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.diagnosis import answered, design, fitting, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
@@ -1526,7 +1527,24 @@ def test_a_quick_look_makes_no_experiment():
     assert (said.kind, said.names) == ("tied, quick", ("field-lag", "delay"))
 
 
+@pytest.mark.parametrize(
+    ("frequency", "mains"),
+    [(50.02, True), (59.5, True), (180.0, True), (55.0, False), (200.0, False)],
+)
+def test_a_line_at_a_frequency_of_the_mains_is_told_as_one(monkeypatch, frequency, mains):
+    """That a hum could equally be a clock that is off is no help to who sees 50 Hz."""
+    best = SimpleNamespace(name="heating", distance=0.002, distance_here=0.001, faster=4.0)
+    monkeypatch.setattr(advice, "best_experiment", lambda state, names: best)
+    line = Estimate("frequency", frequency, "Hz", frequency - 0.1, frequency + 0.1)
+    tied = replace(_finding("periodic", 20.0, confounded_with=("clock-skew",)), parameters=(line,))
+    said = advice.stage(_state(_fit(1.0), findings=(tied,))).advice
+    assert said.figures.get("mains") == (frequency if mains else None)
+
+
 # --- what goes into the model
+GIVEN = type("NamedModel", (str,), {"extensions": ()})("given")
+
+
 def _asked_again(monkeypatch, shares):
     """Repetition of creep, heat and a lag, where the shares that repeat depend on what is in the model."""
 
@@ -1809,12 +1827,13 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
     What is worse, and described its records only with a free beginning, was under way before them, unless it
     is over at once.
     """
+    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
     begun = SimpleNamespace(bins=SimpleNamespace(begins_free=free))
     creep = (Term(CAUSE["creep"], (0.1, tau)),)
     state = _state(replace(_fit(500.0), terms=creep, problem=begun))
-    state = replace(state, repeated=state.current, question=replace(state.question, given=Given("given")))
+    state = replace(state, repeated=state.current, question=replace(state.question, given=Given(GIVEN)))
     found = extension.stage(state)
     assert found.extended == (None if said else "extended")
     assert [one.kind for one in found.evidence] == ([said] if said else [])
@@ -1822,6 +1841,32 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
     waits = advice.stage(replace(found, verdict="creep")).advice
     assert (waits.kind == "rest first") is (said == "under way")
     assert waits.figures.get("rest", 5.0 * tau) == pytest.approx(5.0 * tau)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "contains", "said"),
+    [
+        (10.0, 10.0, "creep", "in the model"),
+        (10.0, 10.1, "creep", "in the model"),
+        (10.0, 10.0, "delay", "no gain"),
+        (10.0, 9.82, "creep", "no gain"),
+    ],
+)
+def test_what_the_model_as_given_contains_is_not_news(monkeypatch, before, after, contains, said):
+    """A model that was extended by creep was diagnosed as one without."""
+    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
+    monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
+    monkeypatch.setattr(
+        extension, "rms_of", lambda state, model, known: after if model == "extended" else before
+    )
+    given = type("NamedModel", (str,), {"extensions": (Extension(contains, ()),)})("given")
+    begun = SimpleNamespace(bins=SimpleNamespace(begins_free=False))
+    state = _state(replace(_fit(500.0, "creep"), problem=begun), findings=(_finding("creep", 90.0),))
+    state = replace(state, repeated=state.current, question=replace(state.question, given=Given(given)))
+    found = extension.stage(replace(state, verdict="creep"))
+    assert [one.kind for one in found.evidence] == [said]
+    assert found.in_model == (("creep",) if said == "in the model" else ())
+    assert (advice.stage(found).advice.kind == "in the model") is (said == "in the model")
 
 
 @pytest.mark.parametrize(
@@ -1834,6 +1879,7 @@ def test_what_only_equal_loops_show_costs_no_extension(monkeypatch, shown, gains
     def with_names(state, model):
         return tuple(term.cause.id for term in state.extensions)
 
+    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
     monkeypatch.setattr(extension, "extended_model", with_names)
     rms = {"given": 10.0, ("creep",): 9.0 if gains else 10.0, ("creep", "load-dependence"): 10.0}
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: rms[model])
@@ -1843,7 +1889,7 @@ def test_what_only_equal_loops_show_costs_no_extension(monkeypatch, shown, gains
     findings = (_finding("creep", 20.0), _finding("load-dependence", 0.0))
     contrast = {"load-dependence": ()} if shown else {}
     state = _state(fit, repeated=fit, findings=findings, by_contrast=contrast)
-    found = extension.stage(replace(state, question=replace(state.question, given=Given("given"))))
+    found = extension.stage(replace(state, question=replace(state.question, given=Given(GIVEN))))
     assert (found.extended or ()) == added
     creep, load = found.findings
     assert (creep.doubts, bool(load.doubts)) == ((), bool(added))

@@ -13,7 +13,14 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_figures import course, ranked, ranking
 from pulsetrainer.report.diagnosis_html import headline
-from pulsetrainer.report.diagnosis_text import answer, explains, parameters, sections
+from pulsetrainer.report.diagnosis_text import (
+    IN_MODEL,
+    answer,
+    evidence,
+    explains,
+    parameters,
+    sections,
+)
 
 NAN = float("nan")
 
@@ -204,3 +211,21 @@ def test_the_figure_bears_the_verdict_of_the_page(verdict):
     """A cause that is told, but is no verdict, is none in the figure's title either."""
     found = replace(store_examples.diagnosis(), verdict=verdict)
     assert course(found).axes[0].get_title("left") == f"Verdict: {verdict}"
+
+
+def test_what_the_model_contains_already_is_told_first():
+    """A verdict of creep, of a model with creep, read like a fault of that model."""
+    found = replace(store_examples.diagnosis(), causes=(_cause(0.0, found=True),), verdict="creep")
+    held = replace(found, in_model=("creep",), extended=None, correctable=())
+    titles = [next(iter(sections(one))).title for one in (found, held)]
+    assert titles == ["verdict: creep", "verdict: creep (the model as given contains it already)"]
+    assert [IN_MODEL in headline(one) for one in (found, held)] == [False, True]
+
+
+def test_evidence_that_stands_with_a_cause_is_not_repeated():
+    """The same paragraph stood under found and under evidence."""
+    one = replace(_cause(None, found=True), cause="outliers", text="5 isolated samples differ")
+    said = ("outliers: 5 isolated samples differ.", "outliers: all in one minute.")
+    found = replace(store_examples.diagnosis(), causes=(one,), evidence=said)
+    assert evidence(found) == ["outliers: all in one minute."]
+    assert evidence(replace(found, causes=())) == list(said)

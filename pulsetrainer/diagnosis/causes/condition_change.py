@@ -45,7 +45,7 @@ class ConditionChange(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output}"),
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output}, beside what the gain changes"),
         Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
     )
     lasting = False
@@ -53,7 +53,7 @@ class ConditionChange(Cause):
         "shifted": (
             "a Preisach model fitted to these recordings describes them, but the given one does not: the "
             "device is in another condition (load, configuration, zero). Its output is shifted by "
-            "{shift:.2g}{in_y} on average; gain and shape are unchanged ({gain:+.1f} %, {left:.2g}{in_y} "
+            "{shift:.2g}{in_y} on average; gain and shape hardly differ ({gain:+.1f} %, {left:.2g}{in_y} "
             "rms). Reset the zero before each use, or identify it again"
         ),
         "changed": (

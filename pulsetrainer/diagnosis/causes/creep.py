@@ -44,7 +44,10 @@ class Creep(OfKinds):
     family = "slow memory"
     scales = True
     number = "middle"
-    meant = "share of the middle one of several time constants (1: it is the only one)"
+    meant = (
+        "share of that time constant; 0.333: tau/4 and 4 tau have as much each; 0.2: so have four from "
+        "tau/10 to 10 tau (1: it is the only one)"
+    )
     tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant
     common = True
     parameters = (

@@ -1,11 +1,11 @@
 """Advice: what to measure next.
 
 If the model as given is of the wrong kind, or of another condition, that comes first: another model is
-needed. If the device was still settling when the records began, it must rest first. If causes are tied, the
-advice is the experiment on which they look least alike, simulated with the model that was found. Otherwise it
-is what the verdict asks for: a fault of the measurement is taken out of the record (`correct`), a property of
-the device goes into the model (`extend`). What the records lack comes after what can be done with them; it
-comes first if that is nothing.
+needed. If the device was still settling when the records began, it must rest first. If the model contains
+what was found already, it is used as it is. If causes are tied, the advice is the experiment on which they
+look least alike, simulated with the model that was found. Otherwise it is what the verdict asks for: a fault
+of the measurement is taken out of the record (`correct`), a property of the device goes into the model
+(`extend`). What the records lack comes after what can be done with them; it comes first if that is nothing.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
+from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -64,6 +65,8 @@ def _not_as_given(state: State) -> Evidence | None:
 
 
 def _of_the_causes(state: State) -> Evidence:
+    if state.verdict in state.in_model:
+        return Evidence("in the model", names=(*state.in_model, *state.lacks))
     tied = next((one for one in state.findings if one.found and one.confounded_with), None)
     if tied is not None:
         names = (tied.cause.id, *tied.confounded_with)
@@ -75,6 +78,7 @@ def _of_the_causes(state: State) -> Evidence:
             "there": percent * best.distance,
             "here": percent * best.distance_here,
             "faster": best.faster,
+            **_at_the_mains(tied),
         }
         if best.distance <= LIMITS.worth_recording * best.distance_here:
             return Evidence("tied, no better", figures=figures, names=names)
@@ -82,6 +86,14 @@ def _of_the_causes(state: State) -> Evidence:
     if state.verdict == "inconclusive":
         return _to_see_more(state)
     return _after_verdict(state)
+
+
+def _at_the_mains(tied: Finding) -> dict[str, float]:
+    """Return the frequency of a disturbance, Hz, where it is one of the mains."""
+    lines = [one.value for one in tied.parameters if tied.cause.line and one.unit == "Hz"]
+    mains = [k * one for one in LIMITS.mains_Hz for k in range(1, LIMITS.mains_harmonics + 1)]
+    near = [one for one in lines if any(abs(one / usual - 1.0) <= LIMITS.mains_within for usual in mains)]
+    return {"mains": near[0]} if near else {}
 
 
 def _after_verdict(state: State) -> Evidence:

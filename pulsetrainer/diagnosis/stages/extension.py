@@ -4,9 +4,10 @@ The search judges a model on averages, with a free offset and a free beginning. 
 levels of its own, starting from rest. It is made here, and must predict these same records better than the
 model as given, by at least three fifths of what the causes gain in the search; otherwise nothing is added to
 the model. A cause that gains less was already under way before the record, and will begin differently in the
-next. What a fault of the measurement did to the records, and can be taken out of them, counts on neither
-side. Equal loops show a cause by differences that the weights can absorb, not by what it predicts: if the
-model gains nothing with it, it is tried without.
+next. Where the model as given contains these causes already, and no worse, that is said. What a fault of the
+measurement did to the records, and can be taken out of them, counts on neither side. Equal loops show a cause
+by differences that the weights can absorb, not by what it predicts: if the model gains nothing with it, it is
+tried without.
 """
 
 from __future__ import annotations
@@ -14,13 +15,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pulsetrainer.artefacts import Model
-from pulsetrainer.diagnosis.answered import extended_model, faults_of, rms_of, undone
+from pulsetrainer.diagnosis.answered import (
+    extended_model,
+    faults_of,
+    percent_of_samples,
+    rms_of,
+    undone,
+)
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.stages import begin
 from pulsetrainer.diagnosis.stages.repetition import DOUBT
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
@@ -45,10 +52,16 @@ def _extended(state: State, given: Model) -> State:
     gained = (plain.squares - state.repeated.squares) / state.floor.count
     if before**2 - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
-    figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}
+    percent = percent_of_samples(state)
+    figures = {"given": percent * before, "extended": percent * after}
     names = tuple(term.cause.id for term in state.extensions)
     rest = _rest(state)
-    said = Evidence(_why_not(state, after <= before, rest), figures=figures | {"rest": rest}, names=names)
+    relevant = state.floor.relevant / state.floor.count * state.scale.span**2
+    if before**2 - after**2 <= relevant and set(names) <= {one.cause for one in given.extensions}:
+        kind = "in the model"
+    else:
+        kind = _why_not(state, after <= before, rest)
+    said = Evidence(kind, figures=figures | {"rest": rest}, names=names)
     return replace(state, repeated=None, evidence=(*state.evidence, said))
 
 

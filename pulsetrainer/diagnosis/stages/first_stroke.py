@@ -45,7 +45,8 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
     for k, (count, even) in enumerate(zip(counts, state.problem.records, strict=True)):
         weight = records[k].sample_weight.copy()
         own = int(np.ceil(count / even.input.size * weight.size))
-        if count > LIMITS.first_stroke_most * even.input.size or not weight[:own].any():
+        step = weight.size / even.input.size  # less than that is only rounded otherwise
+        if count > LIMITS.first_stroke_most * even.input.size or weight[:own].sum() <= max(step, 1.0):
             continue
         weight[:own] = 0.0
         records[k] = replace(records[k], sample_weight=weight)
