@@ -342,6 +342,34 @@ def test_what_is_next_to_the_rail_is_left_out_too():
     assert not _fires("saturation", smooth)
 
 
+def _without_noise(device: str):
+    """Input (n,) in shrinking swings, and the output of a device that has no noise."""
+    u = np.clip(1.0 - np.arange(20_000) / 22_000, 0.1, 1.0) * np.sin(np.arange(20_000) / 100)
+    at, slides = 0.0, []
+    for step in np.diff(u, prepend=0.0).tolist():
+        at = min(max(at + step, -0.3), 0.3)
+        slides.append(at)
+    stop = np.asarray(slides)
+    return u, {"stop": stop, "spring": u + stop, "saturates": np.tanh(3.0 * u) + 0.1 * stop}[device]
+
+
+@pytest.mark.parametrize("digits", [2, 3, 15])
+@pytest.mark.parametrize(
+    ("device", "cut"),
+    [("stop", 9.0), ("spring", 9.0), ("spring", 1.1), ("saturates", 9.0), ("saturates", 0.95)],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_rail_without_noise_stops_the_output_at_once(device, cut, digits, sign):
+    """Sliding friction is as flat, but lets go where the input turns; what saturates slows down first."""
+    u, y = _without_noise(device)
+    shown = np.round(np.minimum(y, cut), digits)
+    fired = CAUSE["saturation"].gate(replace(_raw(sign * shown, sign * u), low=-1.0, high=1.0))
+    assert (fired is not None) is (cut < 9.0)
+    if fired is not None:
+        assert fired.value == sign * cut
+        assert np.all(fired.mask[y > cut])
+
+
 def test_a_rest_at_the_top_of_coarse_steps_is_no_cut():
     """Steps that come at uneven times look like noise of two thirds of a step."""
     rise = np.tile(np.concatenate((np.arange(150), np.arange(150)[::-1])) / 1.7, 10)

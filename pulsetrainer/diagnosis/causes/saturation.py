@@ -1,7 +1,9 @@
 """the output is clipped at the end of its range: found on the raw data.
 
-A rail behind the converter's noise repeats one value exactly. One in front of it is a level at which the
-output stays, within its noise, while the model as given says that it goes on.
+A rail behind the converter's noise repeats one value exactly. Where there is hardly any noise a flat top
+does so too, and it is a rail if the output stops at once on its way and stays while the input goes on and
+back. One in front of the noise is a level at which the output stays, within its noise, while the model as
+given says that it goes on.
 """
 
 from __future__ import annotations
@@ -29,6 +31,11 @@ _NOISY = 0.7  # converter steps of noise: with less a flat top repeats itself; s
 _BESIDE = 3  # samples beside a cut off one, in time: only those with low noise are left there
 _AROUND = 9  # samples whose mean is near the rail where ...
 _NEAR = 3.0  # ... it is nearer than this many times the noise
+# A rail where there is hardly any noise
+_TRAVEL = 0.01  # of the range: so far must the input go on while the output stays ...
+_BACK = 0.25  # ... and this share of it back: where a sliding friction turns, its force falls at once
+_BEFORE = 0.25  # of that travel, just before the output stops: by its slope there the output would go on ...
+_STEPS = 10.0  # ... by so many steps of the output: one that saturates slows down first
 # A rail in front of the noise, against what the model as given says
 _BEYOND = 0.01  # of the span: so far beyond the rail must the model go ...
 _BEYOND_NOISE = 10.0  # ... and so many times the noise
@@ -66,7 +73,7 @@ class Saturation(Cause):
     def gate(self, raw: Raw) -> Firing | None:
         """Extremes that repeat exactly far more often than the values just inside them, at either end."""
         y = raw.calm.output
-        rails = _rails(y)
+        rails = _rails(raw)
         if not rails:
             return _held(raw)
         at = np.any(list(rails.values()), axis=0)
@@ -87,7 +94,7 @@ class Saturation(Cause):
         there.
         """
         rail, measured = taken.raw.polarity * values[0], taken.raw.calm.output
-        rails = _rails(measured)
+        rails = _rails(taken.raw)
         if not rails:  # only the model as given could tell
             sign = 1.0 if rail > measured.mean() else -1.0
             return np.where(_near(sign * measured, sign * rail, noise_of(measured)), np.nan, y)
@@ -98,13 +105,34 @@ class Saturation(Cause):
         return super().undo(y, values, taken) if whole is None else np.where(np.isfinite(y), whole, np.nan)
 
 
-def _rails(y: FloatArray) -> dict[float, BoolArray]:
-    """Samples (n,) at the upper (1) and at the lower (-1) rail; nothing where noise does not tell one."""
+def _rails(raw: Raw) -> dict[float, BoolArray]:
+    """Samples (n,) at the upper (1) and at the lower (-1) rail; nothing where nothing tells one."""
+    y = raw.calm.output
     step = spacing_of(y)
-    signs = [sign for sign in (1.0, -1.0) if _clipped(sign * y, step)]
-    if not signs or noise_of(y) <= _NOISY * step:
-        return {}
-    return {sign: np.max(sign * y) - sign * y <= _AT * step for sign in signs}
+    rails = {
+        sign: np.max(sign * y) - sign * y <= _AT * step for sign in (1.0, -1.0) if _clipped(sign * y, step)
+    }
+    if noise_of(y) > _NOISY * step:
+        return rails
+    return {sign: at for sign, at in rails.items() if _stops_at_once(raw, sign * y, at, step)}
+
+
+def _stops_at_once(raw: Raw, y: FloatArray, at: BoolArray, step: float) -> bool:
+    """Whether an output (n,) runs into its upper end in most of the strokes that leave it there."""
+    u, edges = raw.record.input, np.diff(at.astype(np.int8), prepend=0, append=0)
+    told = []
+    begins, ends = (np.flatnonzero(edges == way).tolist() for way in (1, -1))
+    for begin, end in zip(begins, ends, strict=True):
+        on = u[begin:end] - u[begin]
+        way = np.sign(u[begin] - u[max(begin - _LEAST, 0)])
+        travel = float((way * on).max())
+        if travel <= _TRAVEL * raw.reach:
+            continue
+        back = travel - float(way * on[-1])
+        before = np.flatnonzero(way * (u[begin] - u[:begin]) >= _BEFORE * travel)
+        rise = float(y[begin] - y[before[-1]]) / _BEFORE if before.size else 0.0
+        told.append(back >= _BACK * travel and rise >= max(_STEPS * step, _BEYOND * float(np.ptp(y))))
+    return bool(told) and float(np.mean(told)) > 0.5  # of those strokes
 
 
 def _held(raw: Raw) -> Firing | None:
