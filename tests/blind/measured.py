@@ -5,8 +5,8 @@
 The hysteresis and the noise are those of real devices (``tests/data``): a tool on cables, each record at one
 rate or all three together, and reversal curves of a sediment. What is put in follows formulas of its own, at
 the times as they were stamped. In equal cycles at one rate what takes time is another loop, which the weights
-hold: there ``none`` or ``inconclusive`` is right as well. A line a case, and how often the name is among those that were found or
-could equally be.
+hold: there ``none`` or ``inconclusive`` is right as well. A line a case, and how often the name is among
+those that were found or could equally be.
 """
 
 from __future__ import annotations
