@@ -42,6 +42,9 @@ class Thresholds:
     same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
     jump_of_input: float = 0.1  # of its range from one sample to the next: there the output jumps as well
     noise_least: int = 8  # third differences: fewer tell no noise
+    folded: float = 0.4  # periods of a hum in an average: with half a one it is seen at another frequency
+    line_around: int = 100  # lines of the spectrum on each side of a hum, of whose median ...
+    line_stands: float = 10.0  # ... it is so many times: of 100 000 lines of noise the highest has 4.1
     line_share: float = 0.5  # of the squares of these: one line with more is a hum, and no noise ...
     line_samples: int = 1000  # ... of so many: of fewer one line has much by chance
     line_wide: int = 3  # lines on each side that a window spreads it over

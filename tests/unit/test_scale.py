@@ -114,6 +114,19 @@ def test_there_and_back():
     np.testing.assert_allclose(scale.places(np.asarray([7.0]), "1/s"), [1.0])
 
 
+@pytest.mark.parametrize(
+    ("hum", "frequency", "per"), [(0.0, 50.0, 12), (0.01, 50.0, 8), (0.01, 120.0, 3), (0.01, 20.0, 12)]
+)
+def test_averages_do_not_fold_a_hum(hum, frequency, per):
+    """Means of twelve samples would show 50 Hz as 33.3: where a hum stands out there are fewer in each."""
+    t = np.arange(240_000) / 1000.0
+    u = 0.5 - 0.5 * np.cos(2.0 * np.pi * t / 20.0)
+    y = u**2 + hum * np.sin(2.0 * np.pi * frequency * t)
+    y = y + 0.003 * np.random.default_rng(4).standard_normal(t.size)
+    record = Record(u, y, dt_s=1e-3)
+    assert scale_of([record], 0.0, 1.0, 1.0).shrunk(record).averaged == per
+
+
 @pytest.mark.parametrize("unit", [1.0, 1e-12])
 def test_a_pulse_that_is_stretched_is_said_to_be_in_any_unit(unit):
     """One that goes from a quarter of the reach to three quarters, not one that goes over all of it."""

@@ -25,6 +25,7 @@ _LEAST = 20  # samples at the rail: fewer may be chance
 _PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
 _TOWERS = 4.0  # times any single value just inside: the turn of a smooth signal reaches 2.4
 _AT = 0.5  # converter steps: nearer than that is at the rail
+_ENTERING = 30  # samples before and after the rail whose noise tells whether it would have moved the others
 _INSIDE = 10.5  # converter steps beside the rail that are compared with it ...
 _INSIDE_SPAN = 0.02  # ... but no more than this share of the span
 _NOISY = 0.7  # converter steps of noise: with less a flat top repeats itself; steps alone look like 0.66
@@ -112,9 +113,16 @@ def _rails(raw: Raw) -> dict[float, BoolArray]:
     rails = {
         sign: np.max(sign * y) - sign * y <= _AT * step for sign in (1.0, -1.0) if _clipped(sign * y, step)
     }
-    if noise_of(y) > _NOISY * step:
-        return rails
-    return {sign: at for sign, at in rails.items() if _stops_at_once(raw, sign * y, at, step)}
+    return {
+        sign: at
+        for sign, at in rails.items()
+        if noise_of(y, _beside(at)) > _NOISY * step or _stops_at_once(raw, sign * y, at, step)
+    }
+
+
+def _beside(at: BoolArray) -> FloatArray:
+    """Weight (n,) of the samples just before and after those at a rail: there noise must be, if anywhere."""
+    return (scipy.ndimage.binary_dilation(at, iterations=_ENTERING) & ~at).astype(np.float64)
 
 
 def _stops_at_once(raw: Raw, y: FloatArray, at: BoolArray, step: float) -> bool:
