@@ -7,18 +7,8 @@ from typing import Annotated
 
 from typer import Argument, Context, Option
 
+from pulsetrainer.cli import options
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import (
-    AsJson,
-    DryRun,
-    LimitCurrent,
-    LimitForce,
-    Out,
-    Overwrite,
-    Port,
-    ShowLive,
-    setting,
-)
 
 # what must be the same when a capture is resumed
 _SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
@@ -29,27 +19,30 @@ def capture(
     signal: Annotated[
         str, Argument(help="identification, diagnostic, or a CSV file with the columns t_s and current_A.")
     ],
-    out: Out,
-    port: Port = None,
+    out: options.Out,
+    port: options.Port = None,
     levels: Annotated[
-        int, setting("levels", "--levels", "Levels of the plane whose cells the signal switches.", min=2)
+        int,
+        options.setting("levels", "--levels", "Levels of the plane whose cells the signal switches.", min=2),
     ] = 48,
-    current_max_A: Annotated[float, setting("current_max_A", "--current-max", "Top of the range, A.")] = 1.5,
+    current_max_A: Annotated[
+        float, options.setting("current_max_A", "--current-max", "Top of the range, A.")
+    ] = 1.5,
     speed_A_per_s: Annotated[
-        float, setting("speed_A_per_s", "--speed", "Speed of the identification signal, A/s.")
+        float, options.setting("speed_A_per_s", "--speed", "Speed of the identification signal, A/s.")
     ] = 0.75,
-    rate_Hz: Annotated[float, setting("rate_Hz", "--rate", "Sample rate, Hz.")] = 1000.0,
+    rate_Hz: Annotated[float, options.setting("rate_Hz", "--rate", "Sample rate, Hz.")] = 1000.0,
     condition: Annotated[bool, Option(help="Go around the major loop once before recording.")] = True,
     repeats: Annotated[int, Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[
         bool, Option("--resume", help="Continue an interrupted recording into this output.")
     ] = False,
-    limit_current_A: LimitCurrent = None,
-    limit_force_N: LimitForce = None,
-    live: ShowLive = False,
-    dry_run: DryRun = False,
-    overwrite: Overwrite = False,
-    json: AsJson = False,
+    limit_current_A: options.LimitCurrent = None,
+    limit_force_N: options.LimitForce = None,
+    live: options.ShowLive = False,
+    dry_run: options.DryRun = False,
+    overwrite: options.Overwrite = False,
+    json: options.AsJson = False,
 ) -> None:
     """Play a signal on the device and record current and force.
 

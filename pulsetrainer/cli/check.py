@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Argument, Context, Option
 
@@ -12,15 +12,6 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port
-
-if TYPE_CHECKING:
-    from pulsetrainer.steps.check import Checked, Estimate
-
-_VERDICTS = {
-    "true": "still true",
-    "shifted": "shifted (zero, gain or temperature)",
-    "changed": "changed (the hysteresis has another shape)",
-}
 
 
 def check(
@@ -52,7 +43,8 @@ def check(
             hint="give both, or neither",
         )
     job = Job(context, inputs=(model,), outputs=(out,))
-    from pulsetrainer.steps.check import check_updatable, hindrance, updated
+    from pulsetrainer.report.results import checked
+    from pulsetrainer.steps.check import GAIN, OFFSET_N, check_updatable, hindrance, updated
 
     loaded = job.load(model, pt.Model)
     if update:
@@ -62,38 +54,18 @@ def check(
         info = device.info
     if out is not None:
         job.save(out, updated(loaded, found), f"{model.name} as {info.serial} is now", info)
-    _show(job, model, out, found, info.serial, updatable=not hindrance(loaded))
-
-
-def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, *, updatable: bool) -> None:
-    from pulsetrainer.steps import check as limits
-
-    kelvin, error = found.temperature_K, found.error_percent
-    unknown = f"not known: {found.temperature_unknown}"
-    rows = {
-        "offset": _said(found.offset, "N", 3) + f"; {limits.OFFSET_N:g} N either way is still true",
-        "gain": _said(found.gain, "", 4) + f"; {limits.GAIN:g} either way is still true",
-        "shape": _said(found.shape_percent, "% of the span", 2),
-        "temperature": unknown if kelvin is None else _said(kelvin, "K against calibration", 1),
-        "error": f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain",
-        **{f"reason {number}": reason for number, reason in enumerate(found.reasons, 1)},
-    }
+    title, rows = checked(found, limit_N=OFFSET_N, limit_gain=GAIN)
     if out is not None:
         rows["next"] = (
             f"use {out} in the place of {model}, and invert drives again with it"
             if found.verdict == "shifted"
             else f"go on with {model}: nothing moved more than on a device left alone, {out} is no better"
         )
-    elif found.verdict == "shifted" and updatable:
+    elif found.verdict == "shifted" and not hindrance(loaded):
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
         if job.port:
             rows["next"] += f" --port {shlex.quote(job.port)}"
-    elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
+    elif found.verdict != "true":
         rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
-    job.show(plain(found) | {"output": out}, f"{model} on {serial}: {_VERDICTS[found.verdict]}", rows)
+    job.show(plain(found) | {"output": out}, f"{model} on {info.serial}: {title}", rows)
     job.wrote(out)
-
-
-def _said(estimate: Estimate, unit: str, digits: int) -> str:
-    low, high = estimate.interval
-    return f"{estimate.value:.{digits}f} {unit}".rstrip() + f" ({low:.{digits}f} to {high:.{digits}f})"

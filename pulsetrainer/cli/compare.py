@@ -44,7 +44,8 @@ def compare(
 
         labels = labels_of(evaluations)
         headers = [store.read_header(path) for path in evaluations]
-        metrics = pt.compare(loaded, names=list(map(str, evaluations)), everything=everything)
+        given = list(map(str, evaluations))
+        metrics = pt.compare(loaded, names=given, everything=everything)
         values = {m.name: m.values for m in metrics}
         if out is not None and form == "csv":
             job.write(out, as_csv(evaluations, values))
@@ -53,7 +54,6 @@ def compare(
 
             job.write(out, render.encode(comparison_figure.draw(labels, values), form))
     job.alike(evaluations)
-    given = list(map(str, evaluations))
     job.notes([*differing_quizzes(loaded, given), *differing_units(loaded, given)])
     sources = [
         {"file": path, **picked(header, "title", "created")}
@@ -61,10 +61,7 @@ def compare(
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     learners = isinstance(loaded[0], pt.Session)
-    differ = ["difference"] if learners and len(loaded) == 2 else []  # of a class it would say nothing
-    rows = side_by_side(metrics, verdicts=not learners, change=bool(differ) or not learners)
-    head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
-    job.screen.table(counted(len(labels), loaded[0].kind), head, rows)
+    job.screen.table(counted(len(labels), loaded[0].kind), *side_by_side(metrics, labels, learners=learners))
     if not learners:
         judged = any(m.better is not None for m in metrics)
         unsure = "; one within the spread between repeats gets no verdict" * judged

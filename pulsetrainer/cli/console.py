@@ -97,8 +97,7 @@ class Screen:
         if self.as_json:
             document = {"schema": 1, "command": self.command} | plain(payload)
             if failed is not None:
-                error = {"kind": failed.kind, "message": failed.message, "hint": failed.hint}
-                document |= {"error": error}
+                document["error"] = tables.picked(failed, "kind", "message", "hint")
             universal = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
             sys.stdout.write(json.dumps(document, ensure_ascii=not universal) + "\n")
 

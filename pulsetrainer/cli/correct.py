@@ -43,19 +43,10 @@ def correct(
             error.hint = error.hint.replace("MODEL.h5", model)
             raise
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
-    from pulsetrainer.artefacts.units import with_unit
+    from pulsetrainer.report.results import corrected as said_of
+    from pulsetrainer.report.results import largest_change
 
-    masked = int((~corrected.counts).sum())
-    changed = abs(corrected.output - measured.output)[corrected.counts]  # what is left out was filled in
-    most = float(changed[changed >= 0].max(initial=0.0))  # lost samples are not numbers
-    payload = {"output": out, "corrected": corrected.corrected, "masked_samples": masked}
-    rows = {
-        "taken out": ", ".join(corrected.corrected),
-        "largest change": with_unit(f"{most:.3g}", corrected.output_unit),
-        "samples left out": f"{masked} of {corrected.output.size}",
-    }
-    if not most and masked == int((~measured.counts).sum()):
+    if not largest_change(measured, corrected) and corrected.counts.sum() == measured.counts.sum():
         job.notes(["nothing shows what lies between the steps, so the output is left as it was"])
-    lasting = "a run that the model is tested on may have the same fault: diagnose and correct it too"
-    job.notes([lasting])
-    job.show(payload, f"{out}: corrected run", rows)
+    job.notes(["a run that the model is tested on may have the same fault: diagnose and correct it too"])
+    job.show(*said_of(out, measured, corrected))

@@ -17,8 +17,6 @@ from pulsetrainer.cli.next_step import free
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.steps.arguments import check_once
 
-_ANOTHER_CONDITION = "condition-change"
-
 
 def diagnose(
     context: Context,
@@ -102,9 +100,8 @@ def next_commands(
         pairs = zip(runs, corrected, strict=True)
         words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
         words += _again(corrected, model, pages, "corrected", anew=own)
-    elif (
-        found.verdict == _ANOTHER_CONDITION and len(found.records) == 1
-    ):  # of several, some may be the model's
+    elif found.verdict == "condition-change" and len(found.records) == 1:
+        # of several, some may be the model's
         words += _again(runs, model, pages, "anew", anew=True)
     if not words and found.quick:
         words += _again(runs, model, pages, "full", anew=False)

@@ -39,8 +39,7 @@ def doctor(
     from pulsetrainer.errors import QualityError
 
     screen = Screen("doctor", as_json=json)
-    named = context.parent.params.get("settings_file") if context.parent else None
-    file = settings.find(named, os.environ)
+    file = context.find_root().obj
     rows = settings.effective(file, os.environ)
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:

@@ -70,9 +70,10 @@ def evaluate(
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
         are = "is" if len(broken) == 1 else "are"
-        problem = f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}"
-        hint = "find out what changed; if the new figure is right, change the bound on purpose"
-        failed = QualityError(problem, hint=hint)
+        failed = QualityError(
+            f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}",
+            hint="find out what changed; if the new figure is right, change the bound on purpose",
+        )
     job.alike(model)
     job.notes(evaluation.warnings, "warning: ")
     job.notes(evaluation.notes)

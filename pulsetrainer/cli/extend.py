@@ -29,9 +29,10 @@ def extend(
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
-    inputs = (diagnosis, model, *([] if verify is None else [verify]))
-    job = Job(context, inputs=inputs, outputs=(out,))
+    job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
+    from pulsetrainer.files import provenance, store
     from pulsetrainer.report.facts import extension_words
+    from pulsetrainer.report.results import doubts_of
     from pulsetrainer.report.results import extended as extended_by
 
     with job.working("extending"):
@@ -43,37 +44,9 @@ def extend(
         proof = () if other is None else pt.evaluate(other, [plain, extended]).models
         job.save(out, extended, f"Model extended by {', '.join(added)}")
     if verify is None:
-        job.notes(_doubts(found, extended))
-    elif _was_fitted(model, verify):
+        job.notes(doubts_of(found, extended))
+    elif provenance.sha256_of(verify) in store.read_header(model).provenance.inputs.values():
         job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
     job.show(*extended_by(out, extended, found, verify, proof))
     for one in extended.extensions:
         job.screen.facts(f"with {one.cause}", extension_words(one))
-
-
-def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
-    """Say which causes were added although something speaks against them, or were seen at one rate only."""
-    from pulsetrainer.diagnosis.causes import library
-
-    added = {one.cause for one in extended.extensions}
-    at_one_rate = [name for name in sorted(added) if "rates" in found.lacks and library()[name].widens]
-    rates = (
-        "was seen at one rate of change, or nearly so, and at others it is a guess: "
-        "`verify` RUN.h5 at others would show it"
-    )
-    doubts = dict.fromkeys(
-        f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
-        "shows whether it repeats"
-        for one in found.found
-        if one.cause in added and one.doubts
-    )
-    part = "this is not all of the error, and on other recordings the rest may outweigh the improvement"
-    partly = [] if found.whole else [f"{part}: check with `verify` RUN.h5"]
-    return [*(f"{name} {rates}" for name in at_one_rate), *doubts, *partly]
-
-
-def _was_fitted(model: Path, run: Path) -> bool:
-    """Return whether a model was identified from the run in a file."""
-    from pulsetrainer.files import provenance, store
-
-    return provenance.sha256_of(run) in store.read_header(model).provenance.inputs.values()

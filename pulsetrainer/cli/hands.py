@@ -55,9 +55,9 @@ class Hands:
                 f"a quiz is answered on the keyboard, but {dark}",
                 hint=f"{first}, or give the answers in a file: --answers answers.txt",
             )
+        if "small" in dark:
+            screen.note(f"{dark}; there are no keys")
         if dark:
-            if "small" in dark:
-                screen.note(f"{dark}; there are no keys")
             return Steered(chosen, chosen.share_at)
         if isinstance(chosen, Blind):
             return self._asked(chosen, by_key=by_key)
@@ -71,8 +71,7 @@ class Hands:
         def status(at_s: float) -> str:
             return "; ".join(["paused"] * steering.paused + [said] * (said != "" and at_s < until_s))
 
-        live = Live(press, self.names, blind=False)
-        live.status = status
+        live = Live(press, status, self.names, blind=False)
         return Steered(
             steering, lambda time_s: chosen.share_at(steering.without_pauses(time_s)), live, by_key=True
         )
@@ -87,7 +86,6 @@ class Hands:
     def _asked(self, quiz: Blind, *, by_key: bool) -> Steered:
         """Return a quiz on the screen: a letter answers, Q stops."""
         steering = Steering(quiz, [])
-
         choices = LETTERS[: len(self.names)]
         wrong = ""
 
@@ -99,14 +97,11 @@ class Hands:
             elif key == "Q":
                 steering.press("q")
 
-        live = Live(press, self.names, blind=True)
-        live.status = lambda _s: (
-            f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
-            + (
-                ", answered"
-                if self._answers
-                else ": its beats are over; waiting for your answer" * quiz.waits
-            )
-            + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
-        )
+        def status(_at_s: float) -> str:
+            asked = f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
+            waits = ": its beats are over; waiting for your answer" * quiz.waits
+            not_so = f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops"
+            return asked + (", answered" if self._answers else waits) + (not_so if wrong else "")
+
+        live = Live(press, status, self.names, blind=True)
         return Steered(steering, quiz.share_at, live, by_key=by_key)

@@ -101,8 +101,7 @@ def import_(
         # nothing is written before all of them have been read
         for job, (target, group), (one, _) in zip(jobs, groups.items(), read, strict=True):
             job.notes(one.notes)
-            for path in group:
-                job.uses(path)
+            job.uses(*group)
             job.save(target, one.run, f"{', '.join(path.name for path in group)}, imported")
         progress(1.0)
     _show(jobs[0], groups, read)
@@ -120,5 +119,4 @@ def _show(
     ]
     job.screen.result({"output": runs[0]["output"], "facts": facts[0], "runs": runs})
     for (target, group), figures in zip(groups.items(), facts, strict=True):
-        known = {name: value for name, value in figures.items() if value is not None}
-        job.screen.facts(f"{target}: {', '.join(path.name for path in group)}", known)
+        job.screen.facts(f"{target}: {', '.join(path.name for path in group)}", figures)

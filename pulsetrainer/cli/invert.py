@@ -73,8 +73,7 @@ def invert(
     from pulsetrainer.steps.arguments import check_beat, check_force_range
 
     pulse = pulse_file(waveform)
-    inputs = (model,) if learnt is None else (model, learnt)
-    job = Job(context, inputs=inputs, outputs=(out,))
+    job = Job(context, inputs=(model, learnt), outputs=(out,))
     check_beat(beat)
     check_force_range(force_min, force_max)
     from pulsetrainer.steps.invert import invert as inverse_of

@@ -46,7 +46,7 @@ class Job:
         self,
         context: typer.Context,
         *,
-        inputs: Sequence[Path] = (),
+        inputs: Sequence[Path | None] = (),
         tables: Sequence[Path | None] = (),
         outputs: Sequence[Path | None] = (),
     ) -> None:
@@ -68,10 +68,10 @@ class Job:
             raise UsageError(
                 f"{written[0]} was named for two outputs", hint="name another file for one of them"
             )
-        check_keeps_inputs(written, [*inputs, *filter(None, tables)], context)
+        check_keeps_inputs(written, list(filter(None, (*inputs, *tables))), context)
         for path in written:
             check_output(path, self.overwrite)
-        for path in inputs:
+        for path in filter(None, inputs):
             check_artefact(path)
         for table in filter(None, tables):
             check_file(table)
@@ -162,9 +162,9 @@ class Job:
         self._artefacts.append(path)
         return store.read_one_of(path, *kinds) if kinds else store.read_any(path)
 
-    def uses(self, path: Path) -> None:
-        """Name a file that is no artefact, but that the result is made from."""
-        self._tables.append(path)
+    def uses(self, *paths: Path) -> None:
+        """Name files that are no artefacts, but that the result is made from."""
+        self._tables += paths
 
     def know(self, name: str, value: Any) -> None:
         """Name a parameter of the work that the command line left open."""
@@ -180,7 +180,8 @@ class Job:
         parameters = {
             name: plain(value)
             for name, value in self._parameters.items()
-            if name not in _NOT_PARAMETERS and not _is_path(value)
+            if name not in _NOT_PARAMETERS
+            and not isinstance(value[0] if isinstance(value, list | tuple) and value else value, Path)
         }
         made_from = [store.read_header(path) for path in self._artefacts]
         measurer = None
@@ -267,8 +268,3 @@ class Job:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
             self.screen.note(as_options(with_files(line, self._parameters)), lead)
-
-
-def _is_path(value: Any) -> bool:
-    several = isinstance(value, list | tuple) and len(value) > 0
-    return isinstance(value, Path) or (several and all(isinstance(one, Path) for one in value))

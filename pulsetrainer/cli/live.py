@@ -28,22 +28,23 @@ _ROWS = 5  # of the trace
 _SHOWN_S = 3.0
 _STILL_A = 0.02  # less is what a converter shows of none
 _DRAWN_EACH_S = 0.08
+Press = Callable[[str, float], None]
+Status = Callable[[float], str]
 LETTERS = string.ascii_lowercase  # the keys that answer, in the order of the choices
 
 
 class Live:
     """Shows a session and takes keys, called with each piece of telemetry.
 
-    ``press`` gets every key, with the time of the session in s. ``blind``, in a quiz: the choices are shown,
-    and nothing of the pulse.
+    ``press`` gets every key, with the time of the session in s; ``status`` says a line at such a time.
+    ``blind``, in a quiz: the choices are shown, and nothing of the pulse.
     """
 
-    def __init__(self, press: Callable[[str, float], None], names: Sequence[str], *, blind: bool) -> None:
-        self._press, self._names, self._blind = press, tuple(names), blind
+    def __init__(self, press: Press, status: Status, names: Sequence[str], *, blind: bool) -> None:
+        self._press, self._status, self._names, self._blind = press, status, tuple(names), blind
         self._traces: deque[np.ndarray] = deque()
         self._show: Callable[[RenderableType], None] = lambda _text: None
         self._drawn_s, self._share = -1.0, 0.0
-        self.status: Callable[[float], str] = lambda _s: ""  # at a time of the session, s
 
     def __call__(self, now: Now) -> None:
         """Take the keys that were pressed, and draw."""
@@ -64,7 +65,7 @@ class Live:
 
         if self._blind:
             choices = "  ".join(f"{letter} {name}" for letter, name in zip(LETTERS, self._names))  # noqa: B905
-            return Text(f"{self.status(now.time_s)}\n{choices}  Q stop")
+            return Text(f"{self._status(now.time_s)}\n{choices}  Q stop")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
         force = np.concatenate(self._traces)
         lines = plotted(force, width, _ROWS)
@@ -77,7 +78,7 @@ class Live:
         elif beat is not None:
             rate = 60.0 / now.interval_s
             said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"
-        lines += [said, self.status(now.time_s), keys_in(width)]
+        lines += [said, self._status(now.time_s), keys_in(width)]
         return Text("\n".join(lines), no_wrap=True, overflow="crop")
 
     def _progress(self, share: float) -> None:

@@ -37,9 +37,8 @@ class LoopView:
         self._size = max(min(columns - 2, 72), 1), max(min(lines - 6, _HIGHEST), 1)
         self._ends = max(current_A, 1e-9), max(force_N, 1e-9)
         self._dots = Dots(*self._size)
-        self._taken: list[
-            tuple[FloatArray, FloatArray]
-        ] = []  # since the last drawing: all at a time cost less
+        # since the last drawing: all at a time cost less
+        self._taken: list[tuple[FloatArray, FloatArray]] = []
         self._share, self._label = 0.0, ""
         self._drawn_s = -np.inf
         self._show: Callable[[RenderableType], None] = lambda _drawn: None

@@ -94,13 +94,11 @@ class Command(TyperCommand):
                 stopped.message += f"; {' and '.join(written) or 'nothing'} was written"
                 stopped.hint = "run the command again" + (" with --overwrite" if written else "")
             raise stopped from error
-        except (AbsentError, ExistsError) as error:
-            given = _given_as(ctx, error.path, to_write=isinstance(error, ExistsError))
-            if given is not None:
-                _name(error, given, ctx)
-            error.hint = with_files(error.hint, ctx.params)
-            raise
         except PulsetrainerError as error:
+            if isinstance(error, AbsentError | ExistsError):
+                given = _given_as(ctx, error.path, to_write=isinstance(error, ExistsError))
+                if given is not None:
+                    _name(error, given, ctx)
             error.hint = with_files(error.hint, ctx.params)
             raise
 
@@ -110,21 +108,16 @@ def _check_names(parameter: Any, typed: Any) -> None:
     for name in typed if isinstance(typed, list | tuple) else (typed,):
         if parameter.type.name != "path" or not isinstance(name, str):
             continue
+        option, got = parameter.opts[0], ""
         if not name.strip():
-            raise UsageError(
-                f"{named(parameter)} must name a file, got an empty name",
-                hint="write the name; if a script gives it, check that its variable is set",
-            )
-        if name.endswith("/") and parameter.opts[0] in ("--out", "--html", "-o"):
-            raise UsageError(
-                f"{named(parameter)} must name a file, got the folder {name}",
-                hint="write the name of a file behind it",
-            )
-        if name.startswith("--") and parameter.opts[0].startswith("-"):
-            raise UsageError(
-                f"{named(parameter)} must name a file, got the option {name}",
-                hint=f"write the name after {parameter.opts[0]}, then {name}",
-            )
+            got = "an empty name"
+            hint = "write the name; if a script gives it, check that its variable is set"
+        elif name.endswith("/") and option in ("--out", "--html", "-o"):
+            got, hint = f"the folder {name}", "write the name of a file behind it"
+        elif name.startswith("--") and option.startswith("-"):
+            got, hint = f"the option {name}", f"write the name after {option}, then {name}"
+        if got:
+            raise UsageError(f"{named(parameter)} must name a file, got {got}", hint=hint)
 
 
 def _files(context: typer.Context) -> dict[Path, int]:

@@ -9,13 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pulsetrainer.errors import (
-    DamagedFileError,
-    ExistsError,
-    NotAnArtefactError,
-    PulsetrainerError,
-    WrongKindError,
-)
+from pulsetrainer import errors
 from pulsetrainer.files.input_file import near_names
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
@@ -56,21 +50,18 @@ _NEXT = {
 }
 
 
-def next_step(problem: PulsetrainerError) -> str:
+def next_step(problem: errors.PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
-    if isinstance(problem, ExistsError) and problem.hint == ExistsError.usual:
+    if isinstance(problem, errors.ExistsError) and problem.hint == errors.ExistsError.usual:
         other = shlex.quote(str(free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
-    if isinstance(problem, WrongKindError):
+    if isinstance(problem, errors.WrongKindError):
         return _after_wrong_kind(problem)
-    if isinstance(problem, DamagedFileError):
-        how = (
-            f"with `{to_make(problem.artefact, problem.path)}`"
-            if problem.artefact in MAKES
-            else "(see pulsetrainer --help)"
-        )
+    if isinstance(problem, errors.DamagedFileError):
+        known = problem.artefact in MAKES
+        how = f"with `{to_make(problem.artefact, problem.path)}`" if known else "(see pulsetrainer --help)"
         return f"restore it from a copy, or make it again {how}"
-    if isinstance(problem, NotAnArtefactError):
+    if isinstance(problem, errors.NotAnArtefactError):
         if problem.path.suffix.lower() in _TABLES:
             table = shlex.quote(str(problem.path))
             columns = "--input COLUMN --output COLUMN"
@@ -123,7 +114,7 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
     return text
 
 
-def _after_wrong_kind(problem: WrongKindError) -> str:
+def _after_wrong_kind(problem: errors.WrongKindError) -> str:
     if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
         return f"give each model after a --model of its own: pulsetrainer evaluate run.h5 --model {given}"

@@ -10,23 +10,8 @@ import typer
 from pulsetrainer.errors import EndingError, UsageError
 
 _FORMATS = {
-    *(
-        ".h5",
-        ".csv",
-        ".tsv",
-        ".txt",
-        ".dat",
-        ".xls",
-        ".xlsx",
-        ".json",
-        ".toml",
-        ".yaml",
-        ".yml",
-        ".npz",
-        ".mat",
-        ".wav",
-    ),
-    *(".png", ".svg", ".pdf", ".html", ".htm"),
+    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".yaml", ".yml"),
+    *(".npz", ".mat", ".wav", ".png", ".svg", ".pdf", ".html", ".htm"),
 }
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}

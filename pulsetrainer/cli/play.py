@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Context
 
 import pulsetrainer as pt
+from pulsetrainer.cli import options
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import (
-    AsJson,
-    DryRun,
-    LimitCurrent,
-    LimitForce,
-    Out,
-    Overwrite,
-    Port,
-    ShowLive,
-    TrackHeat,
-    setting,
-)
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray
@@ -32,18 +21,18 @@ if TYPE_CHECKING:
 def play(
     context: Context,
     drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
-    out: Out,
-    port: Port = None,
+    out: options.Out,
+    port: options.Port = None,
     repeats: Annotated[
-        int, setting("repeats", "--repeats", "How often each of the two drives is played.", min=1)
+        int, options.setting("repeats", "--repeats", "How often each of the two drives is played.", min=1)
     ] = 5,
-    track_heat: TrackHeat = None,
-    limit_current_A: LimitCurrent = None,
-    limit_force_N: LimitForce = None,
-    live: ShowLive = False,
-    dry_run: DryRun = False,
-    overwrite: Overwrite = False,
-    json: AsJson = False,
+    track_heat: options.TrackHeat = None,
+    limit_current_A: options.LimitCurrent = None,
+    limit_force_N: options.LimitForce = None,
+    live: options.ShowLive = False,
+    dry_run: options.DryRun = False,
+    overwrite: options.Overwrite = False,
+    json: options.AsJson = False,
 ) -> None:
     """Press a pulse and record the force.
 

@@ -10,7 +10,6 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
-from pulsetrainer.report.tables import picked
 
 
 def refine(
@@ -37,6 +36,7 @@ def refine(
     job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
     from pulsetrainer.report.planned import to_be_refined
+    from pulsetrainer.report.results import refined as said_of
     from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
@@ -58,21 +58,9 @@ def refine(
                     error.message += f"; {out} was not written"
                 raise
             stopped, refined = error, error.kept
-    title = f"{refined.name} refined on {info.serial}"
-    job.save(out, refined, title, info)
-    if stopped is not None:
-        all_of = "1 pass" if len(refined.passes) == 1 else f"{len(refined.passes)} passes"
-        stopped.message += f"; the best of {all_of} was kept in {out}"
+    job.save(out, refined, f"{refined.name} refined on {info.serial}", info)
+    if stopped is not None:  # never in the first pass
+        stopped.message += f"; the best of {len(refined.passes)} passes was kept in {out}"
         raise stopped
     job.notes(refined.notes[len(waveform.notes) :])
-    from pulsetrainer.artefacts.units import counted
-
-    rows = {
-        f"pass {number}{', kept' if number == refined.kept else ''}": (
-            f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "
-            + counted(one.repeats, "repeat")
-        )
-        for number, one in enumerate(refined.passes, 1)
-    }
-    payload = {"output": out, **picked(refined, "name", "passes", "kept"), "serial": info.serial}
-    job.show(payload, f"{out}: {title}", rows)
+    job.show(*said_of(out, refined, info))

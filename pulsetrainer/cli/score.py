@@ -40,7 +40,7 @@ def say_stored(job: Job, path: Path, html: Path | None, session: pt.Session) -> 
     said = {"beats": int(session.beats.start_s.size), **session.figures(), "underruns": session.underruns}
     said |= picked(session, "complete", "fault", "ended_early")
     job.screen.result(said | {"html": html, **quizzed})
-    job.screen.facts(f"{path}: session", {k: v for k, v in facts(session).items() if v is not None} | right)
+    job.screen.facts(f"{path}: session", facts(session) | right)
     job.wrote(html)
 
 
@@ -64,23 +64,8 @@ def say_pressed(
         error.hint = error.hint or f"{sheet_made}press another one into another file with -o"
         raise
     quizzed, right = _quizzed(quiz)
-    kelvins = [] if done.temperature_K is None else done.temperature_K.tolist()
-    payload: dict[str, Any] = {
-        "output": out,
-        "beats": int(done.beats.start_s.size),
-        **done.figures,
-        "underruns": done.underruns,
-        "parts": done.parts,
-        "force_range_N": (done.reach.low, done.reach.high),
-        **picked(done, "clipped_samples", "dropped_samples"),
-        "temperature_K": kelvins or None,
-        **picked(info, "serial", "firmware"),
-        **quizzed,
-    }
-    told = done.figures | {"full_force": done.full_force}
-    rows = pressed(told, payload["beats"], done.parts, payload["force_range_N"], kelvins)
-    rows["underruns"] = done.underruns
-    job.show(payload, f"{out}: a session on {info.serial}", rows | right)
+    payload, title, rows = pressed(out, done, info)
+    job.show(payload | quizzed, title, rows | right)
     job.wrote(html)
 
 

@@ -77,9 +77,7 @@ def session(
     check_asked_for(answers, quiz, names)
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
-    for path, name in zip(tables, names, strict=True):
-        if str(path) == name:
-            job.uses(path)
+    job.uses(*(path for path, name in zip(tables, names, strict=True) if str(path) == name))
     from pulsetrainer.cli.hands import Hands
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes

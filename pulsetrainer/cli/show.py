@@ -37,12 +37,10 @@ def show(
     said = {"file": file, "kind": artefact.kind, **picked(header, "title", "created", "history")}
     job.screen.result({**said, "facts": found})
     title = f"{file}: {headed(artefact.kind, header.title)}, {header.created}"
+    tables = isinstance(artefact, pt.Evaluation | pt.Diagnosis)
+    job.screen.facts(title, {} if tables else found)
     if isinstance(artefact, pt.Evaluation):
-        job.screen.facts(title, {})
         show_tables(job.screen, artefact)
     elif isinstance(artefact, pt.Diagnosis):
-        job.screen.facts(title, {})
         job.screen.parts(sections(artefact))
-    else:
-        job.screen.facts(title, {name: value for name, value in found.items() if value is not None})
     job.screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))

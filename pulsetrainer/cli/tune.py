@@ -102,22 +102,11 @@ def _would(
 
 def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:
     from pulsetrainer.device.codes import PARAMETER
+    from pulsetrainer.report.results import tuned
 
     job.notes(found.notes)
     if out is None:
         job.notes(["the loop gains are not kept: give -o pulsetrainer.toml to write them down"])
-    before, after = found.tracking_percent.before, found.tracking_percent.after
-    job.show(
-        plain(found) | {"output": out},
-        f"{out}: {found.serial}" if out else f"{found.serial} (gains not kept)",
-        {
-            "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
-            f"{found.supply_V:.1f} V {'by the diode' if supply_V is None else 'as given'}",
-            **{name: f"{value} {PARAMETER[name].unit}" for name, value in found.gains.values().items()},
-            "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
-            "tracking": f"{after:.2f} % of the range at worst"
-            + ("" if before is None else f", {before:.2f} % before"),
-            "step": f"settled after {found.settle_ms:.1f} ms, overshoot {found.overshoot_percent:.1f} %; "
-            "no pulse has such a step",
-        },
-    )
+    gains = {name: f"{value} {PARAMETER[name].unit}" for name, value in found.gains.values().items()}
+    supply = "by the diode" if supply_V is None else "as given"
+    job.show(plain(found) | {"output": out}, *tuned(out, found, gains, supply=supply))

@@ -92,7 +92,10 @@ def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageErro
 
 
 def check_apart(words: Sequence[str]) -> None:
-    """UsageError for ``-output x.h5`` and ``-o=x.h5``: to the parser they name the files utput and =x.h5."""
+    """UsageError for ``-output x.h5`` and ``-o=x.h5``: to the parser they name the files utput and =x.h5.
+
+    And for ``--show-completion zsh``, which takes no value.
+    """
     for word in words[: words.index("--") if "--" in words else None]:
         if word.startswith(("-ou", "-o=")):
             name = word.partition("=")[2] or "FILE"
@@ -100,12 +103,7 @@ def check_apart(words: Sequence[str]) -> None:
                 f"there is no option {word}: give the file to write after -o and a space",
                 hint=f"-o {shlex.quote(name)}" + "; --output names a column" * ("import" in words),
             )
-    _check_completion(words)
-
-
-def _check_completion(words: Sequence[str]) -> None:
-    """UsageError for ``--show-completion zsh``: typer asks the surroundings for the shell, not the words."""
-    first, second = (*words, "", "")[:2]
+    first, second = (*words, "", "")[:2]  # typer asks the surroundings for the shell, not the words
     if first in ("--show-completion", "--install-completion") and second:
         raise UsageError(
             f"{first} is for the shell it runs in and takes no value, got {second}",
@@ -172,39 +170,33 @@ def _columns(table: Path) -> tuple[str, ...]:
     """Return the columns of a table that is to be imported; DataError where there is none to be read."""
     from pulsetrainer.files.input_file import check_file
 
-    check_file(table)
-    if table.suffix.lower() in (".npz", ".npy", ".mat", ".wav"):
-        from pulsetrainer.files.array_files import reader_of
-
-        reads = reader_of(table)
-        return tuple(reads(table).values) if reads else ()
+    check_file(table)  # before what is slow to import
+    from pulsetrainer.files.array_files import reader_of
     from pulsetrainer.files.csv_dialect import detect
 
-    return detect(table).names
+    reads = reader_of(table)
+    return tuple(reads(table).values) if reads else detect(table).names
 
 
 def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
     """What has no words of its own here, but for one argument too many and a command that does not exist."""
-    help_ = f"{command} --help"
     if extra := _EXTRA.match(said):
         problem = _one_too_many(extra[1], command, parsed)
         if meant := spaced(words):
             problem.hint = f"put a name with spaces in quotes: {meant}"
         return problem
-    unknown = _UNKNOWN.match(said)
-    if unknown is None:
-        return UsageError(said, hint=help_)
-    if unknown[1] == "help" and (of := [word for word in words if word in parsed.commands]):
-        return UsageError("there is no command 'help'", hint=f"{command} {of[0]} --help")
-    if unknown[1] in _NO_COMMAND:
-        return UsageError(f"there is no command {unknown[1]!r}", hint=_NO_COMMAND[unknown[1]])
-    return UsageError(
-        f"there is no command {unknown[1]!r}", hint=_command_for(unknown[1], unknown[2], parsed)
-    )
+    if unknown := _UNKNOWN.match(said):
+        hint = _command_for(unknown[1], unknown[2], parsed, words)
+        return UsageError(f"there is no command {unknown[1]!r}", hint=hint)
+    return UsageError(said, hint=f"{command} --help")
 
 
-def _command_for(word: str, near: str, parsed: Any) -> str:
+def _command_for(word: str, near: str, parsed: Any, words: Sequence[str]) -> str:
     """What to type in the place of a word that is no command: a file, a line in quotes, capitals."""
+    if word == "help" and (of := [word for word in words if word in parsed.commands]):
+        return f"pulsetrainer {of[0]} --help"
+    if word in _NO_COMMAND:
+        return _NO_COMMAND[word]
     first = word.strip().partition(" ")[0]
     if first != word and first in parsed.commands:
         return f"leave out the quotes: pulsetrainer {word}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 
 from pulsetrainer.device import codes
 from pulsetrainer.device.plausibility import ForceWatch
@@ -71,11 +72,7 @@ class Follower:
         else:  # the device is gone: what is missing between the samples that came
             dropped = player.last_tick // player.decimation + 1 - received
         return Trace(
-            tick=block.tick,
-            reference_A=block.reference_A,
-            current_A=block.current_A,
-            force_N=block.force_N,
-            duty=block.duty,
+            **{one.name: getattr(block, one.name) for one in fields(block)},
             tick_rate_Hz=self._tick_rate_Hz,
             dropped_samples=dropped,
             # Interrupted even if it came during the last ramp: the user wants out.

@@ -223,23 +223,17 @@ class Bench:
             "heating": experiment.HEATING_S,
             "short": LIMITS.short_s,
         }
+        columns = (("time", "s"), (self.input, self.unit), (self.output, self.unit_of_output))
         shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
         return {
             "input": self.input,
             "output": self.output,
             "second": "second" if self.timed else "sample",
             "seconds": "s" if self.timed else "samples",
-            **{name: self._level(share) for name, share in shares.items()},
+            **{name: with_unit(self._number(share), self.unit) for name, share in shares.items()},
             "highest": self._number(1.0),
             "columns": joined(
-                [
-                    f"{name} in {shown(unit)}" if shown(unit) else name
-                    for name, unit in (
-                        ("time", "s"),
-                        (self.input, self.unit),
-                        (self.output, self.unit_of_output),
-                    )
-                ]
+                [f"{name} in {shown(unit)}" if shown(unit) else name for name, unit in columns]
             ),
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
@@ -251,9 +245,6 @@ class Bench:
     def lasting(self, name: str, faster: float) -> str:
         """Return how long an experiment takes, as the end of a phrase."""
         return f", about {self.time(experiment.length_s(name) / faster)} in all" if self.timed else ""
-
-    def _level(self, share: float) -> str:
-        return with_unit(self._number(share), self.unit)
 
     def _levels(self, shares: Sequence[float]) -> str:
         *rest, last = [self._number(share) for share in shares]

@@ -33,7 +33,6 @@ from pulsetrainer.diagnosis.forms import completed, static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.raw import noise_of
-from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.stages.raw_data import followed, masked_by
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -328,10 +327,6 @@ def extended_model(state: State, model: Model) -> Model:
 
 
 def _extension(state: State, term: Term, words: Words) -> Extension:
-    rows = (*_constants(term, state.scale), *state.repeated_estimates[term.cause.id])
+    kept = [Estimate(name, value, unit, value, value) for name, value, unit in term.cause.constants()]
+    rows = (*map(state.scale.estimate, kept), *state.repeated_estimates[term.cause.id])
     return Extension(term.cause.id, _parameters(state, term.cause, rows, words))
-
-
-def _constants(term: Term, scale: Scale) -> list[Estimate]:
-    rows = [Estimate(name, value, unit, value, value) for name, value, unit in term.cause.constants()]
-    return [scale.estimate(one) for one in rows]

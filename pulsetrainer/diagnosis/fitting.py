@@ -164,7 +164,8 @@ def weights_for(
     if simulator is not None:
         added = simulator(terms) - design.shown(simulator.operator)
     elif problem.base is not None:
-        added = _none(problem)(terms)
+        # before anything is fitted: what the weights correct, alone
+        added = Simulator(problem, _operator(problem, np.zeros(problem.plane.n_q), 0.0))(terms)
     for _ in range(LIMITS.passes):
         wanted = problem.measured - added
         found = design.fit(wanted, passive, signed=problem.signed)
@@ -187,11 +188,6 @@ def _operator(problem: Problem, masses: FloatArray, offset: float) -> Preisach:
     """Return the operator with masses (n_q,) on the plane of the problem."""
     plane = problem.plane
     return Preisach(plane, masses / plane.areas, offset, signed=problem.signed)
-
-
-def _none(problem: Problem) -> Simulator:
-    """Return the simulator before anything is fitted: what the weights correct, alone."""
-    return Simulator(problem, _operator(problem, np.zeros(problem.plane.n_q), 0.0))
 
 
 def _rows(problem: Problem, terms: Sequence[Term]) -> Design:

@@ -20,15 +20,7 @@ import numpy as np
 from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
-from pulsetrainer.files.csv_cells import (
-    COMMA_DECIMAL,
-    MISSING,
-    is_number,
-    is_text,
-    number,
-    readable,
-    split,
-)
+from pulsetrainer.files.csv_cells import COMMA_DECIMAL, MISSING, is_number, is_text, number, readable, split
 
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
@@ -318,7 +310,7 @@ def _with_header(
         text_columns=of_text,
         stamped=frozenset(k for k, cells in enumerate(columns) if _is_stamped(cells)),
         rate_Hz=stated[0] if stated else rate,
-        day_first=stamps.day_first(_columns(body, delimiter, _last_lines(path, encoding))),
+        day_first=stamps.day_first(_columns(body, delimiter, _tail(path, encoding).splitlines())),
     )
 
 
@@ -348,13 +340,9 @@ def _is_stamped(cells: list[str]) -> bool:
 def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> list[tuple[str, ...]]:
     """Return the columns of the first rows and the last lines, as far as these are rows of the same kind."""
     width = len(rows[0])
-    whole = [row for row in (*rows, *(split(line, delimiter) for line in last)) if len(row) == width]
+    below = (split(line, delimiter) for line in last if line.strip())
+    whole = [row for row in (*rows, *below) if len(row) == width]
     return list(zip(*whole, strict=True))
-
-
-def _last_lines(path: Path, encoding: str) -> list[str]:
-    """Return the whole lines in the last few kilobytes of a file."""
-    return [line for line in _tail(path, encoding).splitlines() if line.strip()]
 
 
 def _tail(path: Path, encoding: str) -> str:

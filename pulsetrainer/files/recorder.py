@@ -61,8 +61,8 @@ class RunRecorder:
         self._overwrite = overwrite
         self._header = header
         self._texts: dict[str, Any] = {"captured": True, "signal": signal}
-        self._samples = 0
-        self._last_time = -np.inf
+        self.samples = 0  # that are safe on disk
+        self.end_s = -np.inf  # time of the last one
         self._seams: list[int] = []  # numbers of the samples that come first after a pause
         self._complete: bool | None = None  # None: not finished
         self.coil: Coil | None = None  # set it before the end, where it is known
@@ -87,16 +87,6 @@ class RunRecorder:
                 raise cannot_write(self.partial, error) from error
             raise
 
-    @property
-    def samples(self) -> int:
-        """How many samples are safe on disk."""
-        return self._samples
-
-    @property
-    def end_s(self) -> float:
-        """Time of the last sample."""
-        return self._last_time
-
     def append(self, *batch: ArrayLike) -> None:
         """Append a batch: time, reference, input and output (n,). It now survives the death of the program.
 
@@ -108,10 +98,10 @@ class RunRecorder:
         if count == 0:
             return
         self._check_space(count)
-        tag = journal.PART if self._seams[-1:] == [self._samples] else self._tag
+        tag = journal.PART if self._seams[-1:] == [self.samples] else self._tag
         self._add(tag, np.stack(columns).tobytes())
-        self._samples += count
-        self._last_time = float(columns[0][-1])
+        self.samples += count
+        self.end_s = float(columns[0][-1])
 
     def _add(self, tag: bytes, content: bytes) -> None:
         try:
@@ -121,8 +111,8 @@ class RunRecorder:
 
     def begin_part(self) -> None:
         """Say that the device was off since the last sample: the next one is the first of a new part."""
-        if self._samples and self._seams[-1:] != [self._samples]:
-            self._seams.append(self._samples)
+        if self.samples and self._seams[-1:] != [self.samples]:
+            self._seams.append(self.samples)
 
     def _take_over(self, run: Run, *, copied: bool) -> None:
         """Begin with the samples of a recording that was cut off; those of a journal are there already."""
@@ -136,8 +126,8 @@ class RunRecorder:
                 for start in range(0, part.input.size, PIECE):
                     self.append(*(array[start : start + PIECE] for array in arrays))
             else:
-                self._samples += part.input.size
-        self._last_time = float(run.time_s[-1])
+                self.samples += part.input.size
+        self.end_s = float(run.time_s[-1])
 
     def _check_batch(self, columns: list[FloatArray]) -> int:
         """Return the length of a batch that can be appended."""
@@ -148,12 +138,12 @@ class RunRecorder:
             raise ArgumentError(
                 f"a batch needs arrays of one length: {shapes}", hint="this is a bug in the caller"
             )
-        time = np.concatenate(([self._last_time], columns[0]))
+        time = np.concatenate(([self.end_s], columns[0]))
         fits = (np.diff(time) > 0) & np.isfinite(time[1:])
         if not fits.all():
             k = int(np.argmin(fits))
             raise ArgumentError(
-                f"the time of sample {self._samples + k} is {time[k + 1]:g} s after {time[k]:g} s: "
+                f"the time of sample {self.samples + k} is {time[k + 1]:g} s after {time[k]:g} s: "
                 "it must increase",
                 hint="this is a bug in the caller",
             )
@@ -168,7 +158,7 @@ class RunRecorder:
         except OSError:
             return
         free = disk.f_bavail * disk.f_frsize
-        if free < _RESERVE_BYTES + (self._samples + 2 * count) * _BYTES_PER_SAMPLE:
+        if free < _RESERVE_BYTES + (self.samples + 2 * count) * _BYTES_PER_SAMPLE:
             raise DataError(
                 f"the disk of {self.partial.parent} is full: {free} bytes are left",
                 hint="free some space, or write to another disk; what was recorded so far is kept",
@@ -187,7 +177,7 @@ class RunRecorder:
         if not self.partial.exists():  # the run has its name, or nothing was recorded
             return self._final
         try:
-            if not self._samples:
+            if not self.samples:
                 self.partial.unlink()
                 raise DataError(
                     f"nothing was recorded, so {self._final} was not written", hint="check the device"
@@ -207,7 +197,7 @@ class RunRecorder:
     def _convert(self) -> None:
         """Write the journal as an artefact, piece by piece."""
         values = {plan.name: plan.default for plan in plan_of(self._kind)} | self._known_fields()
-        values |= dict.fromkeys(self._columns, Later(self._samples))
+        values |= dict.fromkeys(self._columns, Later(self.samples))
         values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
         store.write_fields(
             self._final, self._kind, values, self._header, overwrite=self._overwrite, fill=self._fill
@@ -215,7 +205,7 @@ class RunRecorder:
 
     def _known_fields(self) -> dict[str, Any]:
         """Return the fields of the artefact that are no columns."""
-        return {**self._texts, "seam": seam_of(self._seams, self._samples), "coil": self.coil}
+        return {**self._texts, "seam": seam_of(self._seams, self.samples), "coil": self.coil}
 
     def _fill(self, file: h5py.File) -> None:
         paths = {plan.name: plan.path for plan in plan_of(self._kind)}
@@ -235,7 +225,7 @@ class RunRecorder:
     def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> None:
         if error is None:
             self.finish()
-        elif self._samples:
+        elif self.samples:
             try:
                 self.finish(complete=False)
             except PulsetrainerError as second:

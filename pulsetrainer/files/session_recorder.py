@@ -50,7 +50,7 @@ class SessionRecorder(RunRecorder):
 
     def forget(self) -> None:
         """Take what was recorded for nothing: a block that ends with an error then leaves no file."""
-        self._samples = 0
+        self.samples = 0
 
     def _known_fields(self) -> dict[str, Any]:
         return dict(self._fields)

@@ -89,8 +89,7 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     if one.name == "direction":
         axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
         axes.margins(x=0.08)
-    axes.set_xlabel(_folded(axis_of(one, input_quantity)))
-    axes.set_ylabel(label("rms error left", one.output_unit))
+    axes.set(xlabel=_folded(axis_of(one, input_quantity)), ylabel=label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
     return figure

@@ -16,6 +16,7 @@ from pulsetrainer.core import input_noise
 from pulsetrainer.core.loop import drawn
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.report.diagnosis_text import parameters
+from pulsetrainer.report.tables import picked
 
 
 def facts(artefact: Any) -> dict[str, Any]:
@@ -35,9 +36,8 @@ def facts(artefact: Any) -> dict[str, Any]:
 def _playback(played: Playback) -> dict[str, Any]:
     return _waveform(played.waveform) | {
         "repeats": played.compensated.output.shape[0],
-        "complete": played.complete,
-        "dropped_samples": played.dropped_samples,
-        **_temperatures(played.temperature_K),
+        **picked(played, "complete", "dropped_samples"),
+        **coil_words(played.temperature_K),
     }
 
 
@@ -70,8 +70,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
         f"input ({run.input_quantity})": span_words(run.input, run.input_unit),
         f"output ({run.output_quantity})": span_words(run.output, run.output_unit),
         "reversals": reversals,
-        "complete": run.complete,
-        "dropped_samples": run.dropped_samples,
+        **picked(run, "complete", "dropped_samples"),
     }
 
 
@@ -122,9 +121,7 @@ def _model(model: Model) -> dict[str, Any]:
         **({"warning": fit.warning} if fit and fit.warning else {}),
         "levels": model.levels,
         "cells": model.weights.size,
-        "reading": model.reading,
-        "polarity": model.polarity,
-        "form": model.form,
+        **picked(model, "reading", "polarity", "form"),
         "loop": loop_drawn(model) or None,
         f"{'output' if model.form == 'dual' else 'input'} ({model.edges_quantity})": span_words(
             model.edges, model.edges_unit
@@ -163,8 +160,7 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
         "seconds": float(waveform.time_s[-1]),
         "target": span_words(waveform.target[waveform.scored], waveform.output_unit),
         "compensated drive": span_words(waveform.compensated, waveform.input_unit),
-        "clipped_samples": waveform.clipped_samples,
-        "source": waveform.source,
+        **picked(waveform, "clipped_samples", "source"),
         **(_refined(waveform) if waveform.passes else {}),
     }
 
@@ -173,24 +169,19 @@ def _refined(waveform: Waveform) -> dict[str, Any]:
     kept = waveform.passes[waveform.kept - 1]
     return {
         "refined": f"pass {waveform.kept} of {len(waveform.passes)}, {counted(kept.repeats, 'repeat')}",
-        "mean_abs_error_percent": kept.mean_abs_error_percent,
-        "max_abs_error_percent": kept.max_abs_error_percent,
+        **picked(kept, "mean_abs_error_percent", "max_abs_error_percent"),
     }
 
 
 def _diagnosis(found: Diagnosis) -> dict[str, Any]:
     return {
-        "verdict": found.verdict,
-        "quick": found.quick,
+        **picked(found, "verdict", "quick"),
         "found": [
             f"{one.cause} ({', '.join(map(' '.join, parameters(one.parameters).items()))})"
             for one in found.found
         ],
-        "rms_percent": found.rms_percent,
-        "noise_percent": found.noise_percent,
-        "static_percent": found.static_percent,
-        "extended_percent": found.extended_percent,
-        "floor_percent": found.floor_percent,
+        **picked(found, "rms_percent", "noise_percent"),
+        **picked(found, "static_percent", "extended_percent", "floor_percent"),
         "next": found.next_experiment,
     }
 
@@ -203,16 +194,14 @@ def _session(session: Session) -> dict[str, Any]:
         "seconds": float(np.ptp(session.time_s)) if session.time_s.size else 0.0,
         **session.figures(),
         "error in just noticeable differences": session.error_jnd,
-        **_temperatures(session.temperature_K),
-        "underruns": session.underruns,
-        "complete": session.complete,
+        **coil_words(session.temperature_K),
+        **picked(session, "underruns", "complete"),
         **({"ended early": session.ended_early} if session.ended_early else {}),
         "dropped_samples": session.dropped_samples,
         "right": None if quiz is None else f"{quiz.right} of {len(quiz.asked)}",
     }
 
 
-def _temperatures(kelvin: FloatArray | None) -> dict[str, str]:
-    if kelvin is None or not kelvin.size:
-        return {}
-    return {"coil": warmth_words(kelvin)}
+def coil_words(kelvin: FloatArray | None) -> dict[str, str]:
+    """Say how warm the coil was, where heat was tracked."""
+    return {} if kelvin is None or not kelvin.size else {"coil": warmth_words(kelvin)}

@@ -85,12 +85,10 @@ def run(record: Run) -> Figure:
     above.set_title(title[:1].upper() + title[1:] + ("" if record.complete else ", incomplete"))
     if record.reference is not None:
         panels.headroom(above)
-    below.set_ylabel(output_label)
-    below.set_xlabel(name)
+    below.set(ylabel=output_label, xlabel=name)
     loop = right.subplots()
     panels.orbit(loop, record.input, record.output, **FINE)
-    loop.set_xlabel(input_label)
-    loop.set_ylabel(output_label)
+    loop.set(xlabel=input_label, ylabel=output_label)
     directions(loop, record.input, record.output)
     title = f"{record.output_quantity} over {record.input_quantity}; arrows: direction"
     loop.set_title(title[:1].upper() + title[1:])
@@ -137,8 +135,7 @@ def playback(played: Playback) -> Figure:
     force.set_title(panels.titled(asked) + ("" if played.complete else ", incomplete"))
     current.set_ylabel(label(panels.quantity_of(played.scaled.input_unit), played.scaled.input_unit))
     error.axhline(0.0, **GUIDE)
-    error.set_ylabel("current error\n[% of range]")
-    error.set_xlabel(label("time", "s"))
+    error.set(ylabel="current error\n[% of range]", xlabel=label("time", "s"))
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)

@@ -16,14 +16,7 @@ from matplotlib.figure import FigureBase
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
-from pulsetrainer.artefacts import (
-    Fit,
-    FloatArray,
-    Model,
-    ModelEvaluation,
-    Waveform,
-    WaveformEvaluation,
-)
+from pulsetrainer.artefacts import Fit, FloatArray, Model, ModelEvaluation, Waveform, WaveformEvaluation
 from pulsetrainer.artefacts.units import counted, shown
 from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.fewer_points import extremes, path
@@ -204,13 +197,11 @@ def fit(
         wild = {"linestyle": "none", "marker": "x", "markersize": 4.0, "color": VERMILION}
         loop.plot(record.wild_input, record.wild_output, **wild, label="left out")
     loop.set_xlabel(label(input_quantity, record.input_unit))
-    loop.set_ylabel(label(output_quantity, record.output_unit))
-    loop.set_title("Measured and model")
+    loop.set(ylabel=label(output_quantity, record.output_unit), title="Measured and model")
     headroom(loop, 0.1)
     x, name = abscissa(record.time_s, record.output.size)
     residual(below, x, record.output - record.predicted, record.rms)
-    below.set_xlabel(name)
-    below.set_ylabel(label("residual", record.output_unit))
+    below.set(xlabel=name, ylabel=label("residual", record.output_unit))
     below.set_title(residual_title(record.rms_percent))
 
 
@@ -246,8 +237,7 @@ def prediction(
     residual(below, x, model.output - model.predicted, model.rms)
     if reach is not None and np.isfinite(reach) and reach > 0:
         below.set_ylim(-1.05 * reach, 1.05 * reach)
-    below.set_xlabel(name)
-    below.set_ylabel(label("residual", model.output_unit))
+    below.set(xlabel=name, ylabel=label("residual", model.output_unit))
     below.set_title(residual_title(model.rms_percent))
 
 
@@ -264,14 +254,12 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
     trace(above, played.time_s, played.target, **TARGET, label="target")
     trace(above, played.time_s, played.scaled.output, **SCALED, label="scaled")
     trace(above, played.time_s, played.compensated.output, **COMPENSATED, label="compensated")
-    above.set_ylabel(label("force", played.output_unit))
-    above.set_title(titled(played))
+    above.set(ylabel=label("force", played.output_unit), title=titled(played))
     headroom(above)
     below.axhline(0.0, **GUIDE)
     for drive, style in ((played.scaled, SCALED), (played.compensated, COMPENSATED)):
         trace(below, played.time_s, 100.0 * (drive.output - played.target) / played.full_force, **style)
-    below.set_xlabel(label("time", "s"))
-    below.set_ylabel("error\n[% of full force]")
+    below.set(xlabel=label("time", "s"), ylabel="error\n[% of full force]")
 
 
 def inversions(played: Sequence[WaveformEvaluation]) -> list[str]:
@@ -302,10 +290,8 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequ
         shown = f"{one.inversion}: mean {digits(one.compensated.mean_abs_error_percent)} %"
         trace(above, x, measured, **style, label=shown)
         trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
-    above.set_ylabel(label("force", first.output_unit))
-    above.set_title(f"{first.name}, one beat")
-    below.set_xlabel(label("time", "s"))
-    below.set_ylabel("error\n[% of full force]")
+    above.set(ylabel=label("force", first.output_unit), title=f"{first.name}, one beat")
+    below.set(xlabel=label("time", "s"), ylabel="error\n[% of full force]")
     panel.legend(loc="outside lower center", ncols=2, columnspacing=0.8, handlelength=1.5, handletextpad=0.5)
 
 
@@ -333,8 +319,7 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequen
         shown = f"{name}: {digits(drive.hysteresis_percent)}"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
-    axes.set_xlabel(label("target", first.output_unit))
-    axes.set_ylabel(label("force", first.output_unit))
+    axes.set(xlabel=label("target", first.output_unit), ylabel=label("force", first.output_unit))
     title = f"{first.name}{'' if several else f', {first.inversion}'}: one beat"
     axes.set_title(textwrap.fill(title, _SQUARE_TITLE, break_on_hyphens=False))
     step = float(np.diff(MaxNLocator(7, steps=(1, 2, 5, 10)).tick_values(*ends))[0])
@@ -383,8 +368,7 @@ def passes(panel: FigureBase, waveform: Waveform) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.axvline(waveform.kept, **GUIDE)
     axes.set_xticks(numbers)
-    axes.set_xlabel(f"pass; pass {waveform.kept} is kept")
-    axes.set_ylabel("error\n[% of full force]")
+    axes.set(xlabel=f"pass; pass {waveform.kept} is kept", ylabel="error\n[% of full force]")
     panel.legend(loc="outside lower center", ncols=3)
 
 

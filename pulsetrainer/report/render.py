@@ -86,17 +86,14 @@ def _adapt(element: ET.Element, identifier: str) -> None:
         elif key == "style":
             element.set(key, _page_style(_REFERENCE.sub(rf"url(#{identifier}-\1)", value)))
         else:
-            short = " ".join(_LONG_NUMBER.sub(_two_decimals, value).split())
+            short = _LONG_NUMBER.sub(lambda long: f"{float(long[0]):.2f}".rstrip("0").rstrip("."), value)
+            short = " ".join(short.split())
             element.set(key, _REFERENCE.sub(rf"url(#{identifier}-\1)", short))
     # indentation is a fifth of the file; the text of a label is not indentation
     if element.text is not None and not element.text.strip():
         element.text = None
     if element.tail is not None and not element.tail.strip():
         element.tail = None
-
-
-def _two_decimals(match: re.Match[str]) -> str:
-    return f"{float(match[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def _page_style(style: str) -> str:

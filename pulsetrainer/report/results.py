@@ -14,7 +14,8 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
-from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.report.facts import coil_words, loop_words, minor_words, run_facts, span_words
 from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
 from pulsetrainer.report.tables import text as shown
@@ -27,6 +28,11 @@ _VERDICT: Final = {True: "better", False: "worse", None: ""}
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
+_MOVED: Final = {
+    "true": "still true",
+    "shifted": "shifted (zero, gain or temperature)",
+    "changed": "changed (the hysteresis has another shape)",
+}
 _TOLD_PERCENT: Final = 0.001  # of an expected error: less is not told in figures
 _OF_A_FIT: Final = (
     "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
@@ -159,15 +165,74 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
         "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
         "samples": f"{drive.time_s.size} a repeat",
         "lost": counted(made.dropped_samples, "sample"),
-        **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
+        **coil_words(kelvin),
     }
     return payload, f"{out}: {drive_title(drive)} on {serial}", rows
 
 
-def pressed(
-    figures: Mapping[str, float], beats: int, parts: int, reach_N: tuple[float, float], warmth_K: list[float]
-) -> dict[str, Any]:
-    """Say what a session pressed, by figures with its full force; no ``warmth_K``: heat was not tracked."""
+def refined(out: Path, made: Waveform, info: Any) -> Said:
+    """Say what each pass on a device gave."""
+    rows = {
+        f"pass {number}{', kept' if number == made.kept else ''}": (
+            f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "
+            + counted(one.repeats, "repeat")
+        )
+        for number, one in enumerate(made.passes, 1)
+    }
+    payload = {"output": out, **picked(made, "name", "passes", "kept"), "serial": info.serial}
+    return payload, f"{out}: {made.name} refined on {info.serial}", rows
+
+
+def tuned(
+    out: Path | None, found: Any, gains: Mapping[str, str], *, supply: str
+) -> tuple[str, dict[str, Any]]:
+    """Say how a coil was measured, and which ``gains`` suit it; ``supply``: how its voltage is known."""
+    before, after = found.tracking_percent.before, found.tracking_percent.after
+    rows = {
+        "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
+        f"{found.supply_V:.1f} V {supply}",
+        **gains,
+        "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
+        "tracking": f"{after:.2f} % of the range at worst"
+        + ("" if before is None else f", {before:.2f} % before"),
+        "step": f"settled after {found.settle_ms:.1f} ms, overshoot {found.overshoot_percent:.1f} %; "
+        "no pulse has such a step",
+    }
+    return f"{out}: {found.serial}" if out else f"{found.serial} (gains not kept)", rows
+
+
+def checked(found: Any, *, limit_N: float, limit_gain: float) -> tuple[str, dict[str, Any]]:
+    """Say whether a model is still true of its device, and what moved; less than the limits is nothing."""
+    kelvin, error = found.temperature_K, found.error_percent
+    unknown = f"not known: {found.temperature_unknown}"
+    return _MOVED[found.verdict], {
+        "offset": _estimated(found.offset, "N", 3) + f"; {limit_N:g} N either way is still true",
+        "gain": _estimated(found.gain, "", 4) + f"; {limit_gain:g} either way is still true",
+        "shape": _estimated(found.shape_percent, "% of the span", 2),
+        "temperature": unknown if kelvin is None else _estimated(kelvin, "K against calibration", 1),
+        "error": f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain",
+        **{f"reason {number}": reason for number, reason in enumerate(found.reasons, 1)},
+    }
+
+
+def _estimated(estimate: Any, unit: str, digits: int) -> str:
+    low, high = estimate.interval
+    return f"{estimate.value:.{digits}f} {unit}".rstrip() + f" ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def pressed(out: Path, done: Any, info: Any) -> Said:
+    """Say what a session pressed on a device."""
+    figures, beats, kelvin = done.figures, int(done.beats.start_s.size), done.temperature_K
+    payload = {
+        "output": out,
+        "beats": beats,
+        **figures,
+        **picked(done, "underruns", "parts"),
+        "force_range_N": (done.reach.low, done.reach.high),
+        **picked(done, "clipped_samples", "dropped_samples"),
+        "temperature_K": kelvin if kelvin is not None and kelvin.size else None,
+        **picked(info, "serial", "firmware"),
+    }
     spread = [
         f"{what} within {figures[name]:.2g} %"
         for what, name in (("rate", "rate_cv_percent"), ("height", "amplitude_cv_percent"))
@@ -176,14 +241,16 @@ def pressed(
     error = (
         f"{figures['mean_abs_error_percent']:.2f} % mean, {figures['max_abs_error_percent']:.2f} % at most"
     )
-    return {
-        "beats": f"{beats} in {counted(parts, 'part')}",
-        "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
-        "error": f"{error}, of full force ({figures['full_force']:.2f} N)",
+    rows = {
+        "beats": f"{beats} in {counted(done.parts, 'part')}",
+        "force": f"{done.reach.low:.2f} .. {done.reach.high:.2f} N at full amplitude",
+        "error": f"{error}, of full force ({done.full_force:.2f} N)",
         "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
         **({"as asked": f"{', '.join(spread)} (standard deviation)"} if spread else {}),
-        **({"coil": warmth_words(warmth_K)} if warmth_K else {}),
+        **coil_words(kelvin),
+        "underruns": done.underruns,
     }
+    return payload, f"{out}: a session on {info.serial}", rows
 
 
 def evaluated(evaluation: Evaluation) -> dict[str, Any]:
@@ -234,11 +301,15 @@ def as_csv(files: Sequence[Path], metrics: Mapping[str, Sequence[float | None]])
     return text.getvalue()
 
 
-def side_by_side(metrics: Sequence[Any], *, verdicts: bool, change: bool) -> list[list[Any]]:
-    """Return a row for each figure of ``compare``: name, unit, values; as wanted the change, and a verdict.
+def side_by_side(
+    metrics: Sequence[Any], labels: Sequence[str], *, learners: bool
+) -> tuple[list[str], list[list[Any]]]:
+    """Return heads, and a row for each figure of ``compare``: name, unit, values, the change, and a verdict.
 
-    A unit that is not the same everywhere stands behind each value.
+    A unit that is not the same everywhere stands behind each value. ``learners`` get no verdict, and their
+    difference only where they are two: of a class it would say nothing.
     """
+    behind = ["difference"] * (len(labels) == 2) if learners else ["change", ""]
     rows = []
     for m in metrics:
         owner, named = split(m.name)
@@ -247,8 +318,8 @@ def side_by_side(metrics: Sequence[Any], *, verdicts: bool, change: bool) -> lis
         if len(set(m.units)) > 1:
             values = [f"{shown(v)} {u}".rstrip() for v, u in zip(values, m.units, strict=True)]
         row = [f"{owner.removeprefix('session.')}: {named.words}", unit, *values]
-        rows.append(row + [_change(m)] * change + [_VERDICT[m.better]] * verdicts)
-    return rows
+        rows.append(row + [_change(m), _VERDICT[m.better]][: len(behind)])
+    return ["", "unit", *labels, *behind], rows
 
 
 def _change(metric: Any) -> str:
@@ -312,6 +383,25 @@ def extended(
     return payload, f"{out}: extended model of {model.levels} levels", rows
 
 
+def doubts_of(found: Diagnosis, model: Model) -> list[str]:
+    """Say which causes were added although something speaks against them, or were seen at one rate only."""
+    added = {one.cause for one in model.extensions}
+    at_one_rate = [name for name in sorted(added) if "rates" in found.lacks and library()[name].widens]
+    rates = (
+        "was seen at one rate of change, or nearly so, and at others it is a guess: "
+        "`verify` RUN.h5 at others would show it"
+    )
+    doubts = dict.fromkeys(
+        f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
+        "shows whether it repeats"
+        for one in found.found
+        if one.cause in added and one.doubts
+    )
+    part = "this is not all of the error, and on other recordings the rest may outweigh the improvement"
+    partly = [] if found.whole else [f"{part}: check with `verify` RUN.h5"]
+    return [*(f"{name} {rates}" for name in at_one_rate), *doubts, *partly]
+
+
 def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     """Say how the extended model differs from what the diagnosis told."""
     added = {one.cause: {p.name: p.value for p in one.parameters} for one in model.extensions}
@@ -341,6 +431,24 @@ def _left(found: Diagnosis, model: Model) -> dict[str, str]:
         "error before": f"{found.rms_percent:.3f} % of the span, rms of single samples",
         "error now": f"{found.extended_rms_percent:.3f} %; noise alone is {found.noise_percent:.3f} %",
     }
+
+
+def corrected(out: Path, measured: Run, made: Run) -> Said:
+    """Say what was taken out of a run."""
+    masked = int((~made.counts).sum())
+    payload = {"output": out, "corrected": made.corrected, "masked_samples": masked}
+    rows = {
+        "taken out": ", ".join(made.corrected),
+        "largest change": with_unit(f"{largest_change(measured, made):.3g}", made.output_unit),
+        "samples left out": f"{masked} of {made.output.size}",
+    }
+    return payload, f"{out}: corrected run", rows
+
+
+def largest_change(measured: Run, made: Run) -> float:
+    """How far a corrected run is from what was measured, in the samples that count."""
+    changed = abs(made.output - measured.output)[made.counts]  # what is left out was filled in
+    return float(changed[changed >= 0].max(initial=0.0))  # lost samples are not numbers
 
 
 def imported(run: Run, report: Any) -> dict[str, Any]:

@@ -39,8 +39,7 @@ def course(session: Session) -> Figure:
     near = np.abs(session.time_s - middle) <= 0.5 * SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
     panels.trace(above, session.time_s[near], session.output[near], **COMPENSATED, label="measured")
-    above.set_ylabel(label("force", session.output_unit))
-    above.set_xlabel(label("time", "s"))
+    above.set(ylabel=label("force", session.output_unit), xlabel=label("time", "s"))
     stopped = ", stopped early" if session.ended_early else ""
     above.set_title(f"Session: {SHOWN_S:g} seconds from its middle{stopped}")
     panels.headroom(above)
@@ -76,9 +75,6 @@ def confusion(quiz: Quiz) -> Figure:
     axes.set_yticks(range(size), quiz.choices)
     axes.set_xlim(-0.5, size - 0.5)
     axes.set_ylim(size - 0.5, -0.5)
-    axes.set_aspect("equal")
-    axes.set_title("Confusion matrix")
-    axes.set_xlabel("answered")
-    axes.set_ylabel("asked")
+    axes.set(aspect="equal", title="Confusion matrix", xlabel="answered", ylabel="asked")
     axes.grid(visible=False)
     return figure

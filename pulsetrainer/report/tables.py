@@ -18,7 +18,7 @@ _NARROWEST = 24  # beside a lead; less, and the lines go on further left
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """Names and values, one a line."""
+    """Names and values, one a line; what is None is left out."""
 
     title: str
     rows: Mapping[str, Any]
@@ -101,7 +101,7 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
             indents = ((line[: -len(said)], said) for line, said in words)
             lines = "\n".join(folded(lead, said, width, len(lead) + 2) for lead, said in indents) + "\n"
         return lines
-    named = [(label(name), text(told(name, value))) for name, value in part.rows.items()]
+    named = [(label(name), text(told(name, value))) for name, value in part.rows.items() if value is not None]
     longest = max((len(name) for name, _ in named), default=0)
     if width is not None and 2 * longest + 8 > width:  # no room beside the names: below them
         rows = [folded(*one, width) for name, value in named for one in (("  ", name), ("    ", value))]

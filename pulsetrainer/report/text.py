@@ -45,8 +45,7 @@ def of(artefact: Any, width: int | None = None) -> str:
     elif isinstance(artefact, Diagnosis):
         parts = sections(artefact)
     else:
-        known = {name: value for name, value in facts(artefact).items() if value is not None}
-        parts = [Facts(artefact.kind, known)]
+        parts = [Facts(artefact.kind, facts(artefact))]
     lines = (tables.rendered(part, None if isinstance(part, Table) else width) for part in parts)
     return "".join(lines).rstrip("\n")
 

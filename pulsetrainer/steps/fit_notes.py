@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, Run
-from pulsetrainer.artefacts.units import quantity_in_words, with_unit
+from pulsetrainer.artefacts.units import counted, quantity_in_words, with_unit
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
@@ -60,8 +60,8 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
     count, size = sum(int(mask.sum()) for mask in masks), sum(mask.size for mask in masks)
     if not count:
         return []
-    are = "sample is" if count == 1 else "samples are"
-    return [f"{count} wild {are} left out of the fit ({100 * count / size:.2g} % of the record)"]
+    wild = counted(count, "wild sample", "is", "are")
+    return [f"{wild} left out of the fit ({100 * count / size:.2g} % of the record)"]
 
 
 def of_rest(fitted: Fitted) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
-from pulsetrainer.artefacts.units import same_units, units_of, with_seconds, with_unit
+from pulsetrainer.artefacts.units import counted, same_units, units_of, with_seconds, with_unit
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage, little_words, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
@@ -155,12 +155,9 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
     notes = []
     if report.gaps:
         filled = ", filled with straight lines where the input went on" if report.resampled else ""
-        plural = "s" if report.gaps > 1 else ""
         longest = with_seconds(report.longest_gap_s or 0.0)
-        notes.append(
-            f"{name} has {report.gaps} gap{plural} (more than 1.5 usual time steps), the longest of {longest}"
-            f"{filled}"
-        )
+        gaps = f"{counted(report.gaps, 'gap')} (more than 1.5 usual time steps)"
+        notes.append(f"{name} has {gaps}, the longest of {longest}{filled}")
     if report.even is False and not report.resampled:
         ends = (report.shortest_step_s or 0.0, report.longest_step_s or 0.0)
         steps = " to ".join(map(with_seconds, ends))

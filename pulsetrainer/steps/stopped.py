@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.errors import DeviceError, Interrupted
 
@@ -25,8 +26,7 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
 
 def kept_in(where: object, many: int, what: str) -> str:
     """Say what a file keeps of a play that did not reach its end: how many beats, or samples."""
-    were = f"{what} was" if many == 1 else f"{what}s were"
-    return f"; {many} {were} kept in {where} (complete=false)"
+    return f"; {counted(many, what, 'was', 'were')} kept in {where} (complete=false)"
 
 
 def in_part(fault: str, begun_s: float) -> str:

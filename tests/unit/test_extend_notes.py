@@ -9,9 +9,8 @@ import pytest
 import store_examples
 
 from pulsetrainer.artefacts import Extension, Parameter
-from pulsetrainer.cli.extend import _doubts
 from pulsetrainer.report.facts import extension_words, facts
-from pulsetrainer.report.results import extended
+from pulsetrainer.report.results import doubts_of, extended
 
 MIDDLE = "share of the middle one of several time constants (1: it is the only one)"
 
@@ -24,7 +23,7 @@ def _crept(share: float) -> Extension:
 def _said(name, *, lacks=(), doubts=(), curves=1, whole=True):
     cause = SimpleNamespace(cause=name, doubts=doubts)
     found = SimpleNamespace(found=(cause,) * curves, lacks=lacks, whole=whole)
-    return _doubts(found, SimpleNamespace(extensions=(cause,)))
+    return doubts_of(found, SimpleNamespace(extensions=(cause,)))
 
 
 @pytest.mark.parametrize(

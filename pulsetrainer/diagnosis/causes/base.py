@@ -274,6 +274,14 @@ class Late(Cause):
         return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
 
 
+class OfTheRecord(Cause):
+    """A cause that is found on the raw data, and is no property of the device."""
+
+    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
+    stage = "record"
+    lasting = False
+
+
 class OfKinds(Cause):
     """A cause whose formula leaves a number open: each of a few is tried, as a kind of its own."""
 

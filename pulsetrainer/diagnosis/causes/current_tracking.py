@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 _SHARE = 0.02  # of the input's range: a driver that errs less does its work
 _WORST = 0.99  # quantile of the error: what lasts less than a hundredth of the record is a turn
 
 
-class CurrentTracking(Cause):
+class CurrentTracking(OfTheRecord):
     """The driver does not follow its reference."""
 
     id = "current-tracking"
@@ -22,11 +22,8 @@ class CurrentTracking(Cause):
     formula = "u - reference"
     signature = "input and reference differ by more than their noise"
     excitation = "a recorded reference"
-    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
-    stage = "record"
     order = 4
     family = "current-tracking"
-    lasting = False
     size = "from the {input} to its reference; one sample in a hundred is further off"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "one sample in a hundred of the input is {worst:.3g}{in_u} or more away from its reference"

@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw
 
 _SLACK = 0.01  # of the range: a noisy input goes that far beyond its end
 _LEFT_OVER = 0.25  # of the samples with weight: a mask that leaves less takes too much
 
 
-class OutOfRange(Cause):
+class OutOfRange(OfTheRecord):
     """The input leaves the identified range."""
 
     id = "out-of-range"
@@ -22,11 +22,8 @@ class OutOfRange(Cause):
     formula = "u outside the levels"
     signature = "samples beyond the model's first or last level"
     excitation = "any"
-    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
-    stage = "record"
     order = 5
     family = "out-of-range"
-    lasting = False
     size = "beyond the range of the model, at most"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.wild import isolated
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import TINY
 
@@ -31,7 +31,7 @@ _ALONE = 3  # samples of a median that takes away a single wild one
 _LEAST = 3  # wild samples: fewer are no fault of a device
 
 
-class Outliers(Cause):
+class Outliers(OfTheRecord):
     """Isolated samples are wrong."""
 
     id = "outliers"
@@ -39,11 +39,8 @@ class Outliers(Cause):
     formula = "y + wild error"
     signature = "isolated samples far from both neighbours"
     excitation = "any"
-    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
-    stage = "record"
     order = 1
     family = "outliers"
-    lasting = False
     corrects = True
     wild = True
     size = "from the worst sample to those around it"

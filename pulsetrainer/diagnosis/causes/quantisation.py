@@ -9,7 +9,7 @@ import numpy as np
 
 from pulsetrainer.core.censored import between_steps
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
+from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -21,7 +21,7 @@ _USED = 2  # times that each value comes, on average: in a short record all may 
 _MOST = (0.05, 0.95)  # quantiles of the steps: twice their spread is that of the step
 
 
-class Quantisation(Cause):
+class Quantisation(OfTheRecord):
     """The output comes in coarse steps."""
 
     id = "quantisation"
@@ -29,11 +29,8 @@ class Quantisation(Cause):
     formula = "q round(y / q)"
     signature = "the distinct values are evenly spaced"
     excitation = "slow ramps"
-    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
-    stage = "record"
     order = 2
     family = "quantisation"
-    lasting = False
     jagged = True
     corrects = True
     leaves = ("saturation", "stick-slip")

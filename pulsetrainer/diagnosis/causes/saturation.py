@@ -17,7 +17,7 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.censored import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
+from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
 from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
@@ -45,7 +45,7 @@ _FOLLOWS = 0.1  # ... nor is one that follows the model by more than this share
 _BELOW = 0.5  # of the model's error on the whole record: below the rail it must be nearer
 
 
-class Saturation(Cause):
+class Saturation(OfTheRecord):
     """The output is clipped at the end of its range."""
 
     id = "saturation"
@@ -53,11 +53,8 @@ class Saturation(Cause):
     formula = "min(y, y_max)"
     signature = "exactly repeated maxima or minima"
     excitation = "the whole range"
-    source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
-    stage = "record"
     order = 0
     family = "saturation"
-    lasting = False
     corrects = True
     size = "{output} at which it is clipped"
     texts: ClassVar[Mapping[str, str]] = {

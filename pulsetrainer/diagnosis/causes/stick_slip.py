@@ -25,7 +25,7 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, evenly, noise_of
 from pulsetrainer.diagnosis.thresholds import TINY
 
@@ -66,7 +66,7 @@ _BOTH = 4.0  # squared: an amplitude is twice what one of the two frequencies sh
 Strokes = list[tuple[FloatArray, FloatArray]]  # model's output and residual, each (n,)
 
 
-class StickSlip(Cause):
+class StickSlip(OfTheRecord):
     """Flat runs and jumps of one size."""
 
     id = "stick-slip"
@@ -75,10 +75,8 @@ class StickSlip(Cause):
     signature = "flat stretches and then jumps of about equal size while the input moves slowly"
     excitation = "slow ramps"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994"
-    stage = "record"
     order = 3
     family = "stick-slip"
-    lasting = False
     jagged = True
     blinded_by = ("saturation",)
     doubted = True

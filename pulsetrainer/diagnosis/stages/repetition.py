@@ -31,12 +31,7 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import (
-    MAY_BE_NOTHING,
-    MAY_BE_WEAR,
-    SETTLES,
-    squares_moved,
-)
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, squares_moved
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -49,7 +44,11 @@ def stage(state: State) -> State:
     state = _without_held(state)
     kept = state.current
     asked = [one for one in state.findings if _is_asked(state, one.cause)]
-    told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
+    told: dict[str, str] = {
+        one.cause.id: A_FAULT
+        for one in asked
+        if any(library()[name].corrects for name in one.confounded_with)
+    }
     told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt or MAY_BE_WEAR in one.doubts}
     once = set(told) or _weakest(state, kept)
     while once:
@@ -106,11 +105,6 @@ def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
     settles = term.cause.sudden and SETTLES not in finding.doubts and wear.is_as_good(state, term)
     doubts = (*finding.doubts, SETTLES) if settles else finding.doubts
     return replace(finding, explains_percent=state.explains(gain), doubts=doubts)
-
-
-def _may_be_a_fault(finding: Finding) -> bool:
-    """Whether a fault of the measurement fits as well as a cause of the device."""
-    return any(library()[name].corrects for name in finding.confounded_with)
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:

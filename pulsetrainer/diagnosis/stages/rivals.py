@@ -96,7 +96,8 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
     nothing = may_be_nothing(cause.strengths_of(known))
     if nothing:
         yield MAY_BE_NOTHING
-    if _is_in_step(state, term, fall):
+    in_step = term.cause.in_step(term.values, state.problem.frames)
+    if in_step and fall < LIMITS.free_of_weights * squares_added(state, term):  # the weights hold most of it
         yield IN_STEP
     if _may_be_own_error(state, cause, fall):
         yield OWN_ERROR
@@ -130,13 +131,6 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
         yield LITTLE
     if wear.is_as_good(state, term):
         yield SETTLES if term.cause.sudden else MAY_BE_WEAR
-
-
-def _is_in_step(state: State, term: Term, fall: float) -> bool:
-    """Whether a cause is in step with the input, and without it the weights hold most of what it adds."""
-    if not term.cause.in_step(term.values, state.problem.frames):
-        return False
-    return fall < LIMITS.free_of_weights * squares_added(state, term)
 
 
 def squares_added(state: State, term: Term) -> float:

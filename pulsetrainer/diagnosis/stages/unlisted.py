@@ -85,7 +85,10 @@ def _compared(state: State, begun: State, found: Fitted, p_value: float) -> Stat
     replaced = [term for term in state.current.terms if term.cause.id not in after.current.names]
     if not replaced:
         return after
-    return state if _keep_their_names(state, after.current) else _with_names(state, after, replaced)
+    base = state.baseline.squares  # listed causes that explain nearly as much keep their names
+    if base - state.current.squares > LIMITS.nearly_all * (base - after.current.squares):
+        return state
+    return _with_names(state, after, replaced)
 
 
 def _with_names(state: State, after: State, listed: list[Term]) -> State:
@@ -105,12 +108,6 @@ def _with_names(state: State, after: State, listed: list[Term]) -> State:
         return after
     p_values = {**after.p_values, **{t.cause.id: state.p_values[t.cause.id] for t in listed}}
     return _heard_again(elimination.stage(replace(after, current=best, p_values=p_values)))
-
-
-def _keep_their_names(state: State, instead: Fitted) -> bool:
-    """Whether the listed causes explain nearly as much as the model ``instead``."""
-    base = state.baseline.squares
-    return base - state.current.squares > LIMITS.nearly_all * (base - instead.squares)
 
 
 def _predicts(state: State, found: Fitted) -> bool:
