@@ -205,7 +205,8 @@ class RunRecorder:
 
     def _known_fields(self) -> dict[str, Any]:
         """Return the fields of the artefact that are no columns."""
-        return {**self._texts, "seam": seam_of(self._seams, self.samples), "coil": self.coil}
+        measured = {"input_quantity": "current", "output_quantity": "force"}
+        return {**self._texts, **measured, "seam": seam_of(self._seams, self.samples), "coil": self.coil}
 
     def _fill(self, file: h5py.File) -> None:
         paths = {plan.name: plan.path for plan in plan_of(self._kind)}

@@ -1170,9 +1170,9 @@ def test_a_hum_in_step_with_the_loops_that_the_weights_can_follow_is_in_doubt(
     assert found.in_doubt is doubted
 
 
-@pytest.mark.parametrize(("one_point", "doubts"), [((-0.1, 0.3), ("spans zero",)), ((0.1, 0.3), ())])
-def test_a_learned_curve_may_be_nothing_where_each_of_its_points_may(monkeypatch, one_point, doubts):
-    """One point that is away from zero, whatever its time constant is, and it is something."""
+@pytest.mark.parametrize("one_point", [(-0.1, 0.3), (0.1, 0.3)])
+def test_a_learned_curve_is_not_nothing_because_each_of_its_points_may_be(monkeypatch, one_point):
+    """Weights and offset hold what they have in common; what the curve predicts is asked elsewhere."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
     points = [(-0.1, 0.2)] * (KNOTS - 2) + [one_point]
     rows = [Estimate("tau", 0.5, "s", 0.4, 0.6), *(Estimate("f", 0.1, "{y}", *ends) for ends in points)]
@@ -1180,7 +1180,7 @@ def test_a_learned_curve_may_be_nothing_where_each_of_its_points_may(monkeypatch
     current = replace(_fit(300.0), terms=(Term(cause, (0.5, *(0.1 for _ in points))),))
     more = {"without": {"unlisted": _fit(800.0)}, "estimates": {"unlisted": tuple(rows)}}
     state = _state(current, p_values={"unlisted": 0.003}, held_out=HeldOut(0.9), **more)
-    assert rivals.stage(state).findings[0].doubts == doubts
+    assert rivals.stage(state).findings[0].doubts == ()
 
 
 def test_a_score_that_was_not_borne_out_is_explained_where_nothing_is_found(monkeypatch):

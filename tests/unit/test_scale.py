@@ -124,7 +124,8 @@ def test_averages_do_not_fold_a_hum(hum, frequency, per):
     y = u**2 + hum * np.sin(2.0 * np.pi * frequency * t)
     y = y + 0.003 * np.random.default_rng(4).standard_normal(t.size)
     record = Record(u, y, dt_s=1e-3)
-    assert scale_of([record], 0.0, 1.0, 1.0).shrunk(record).averaged == per
+    second = second_of([record], [None], 0.0, 1.0)
+    assert scale_of([record], 0.0, 1.0, second).shrunk(record).averaged == per
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-12])
