@@ -38,6 +38,7 @@ _ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the 
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
+_IN_SECONDS = " in s"  # the heading that `diagnose` asks for: whole seconds under it count no rows
 _SLOW_S, _MANY = 1.0, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
@@ -180,7 +181,8 @@ def _time(
             return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
-        if _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s"):
+        counts = _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s")
+        if counts and not time.endswith(_IN_SECONDS):
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
     heading = table.names[table.index(time)]

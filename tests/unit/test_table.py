@@ -806,6 +806,13 @@ def test_a_column_that_just_counts_is_no_time(table, first, counts):
     assert (read_run(read.path, **COLUMNS).time_s is None) == counts
 
 
+@pytest.mark.parametrize(("heading", "is_time"), [("time in s", True), ("t_s", False), ("n", False)])
+def test_whole_seconds_under_the_heading_that_is_asked_for_are_time(table, heading, is_time):
+    """A diagnosis asks for a table with the column ``time in s``: once a second is a rate, and no count."""
+    read = table(f"{heading},u,y\n" + "".join(f"{k},{k % 5},{k % 3}\n" for k in range(20)))
+    assert (read_run(read.path, **COLUMNS).time_s is not None) is is_time
+
+
 def test_rows_that_count_are_no_time_where_some_are_left_out(table):
     """The numbers of the rows that stay have gaps, and are seconds no more than before."""
     rows = [f"{k},{k % 5},{k % 3}" for k in range(20)]
