@@ -43,8 +43,8 @@ def correct(
             error.hint = error.hint.replace("MODEL.h5", model)
             raise
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
-    from pulsetrainer.report.results import corrected as said_of
-    from pulsetrainer.report.results import largest_change
+    from pulsetrainer.report.diagnosis_results import corrected as said_of
+    from pulsetrainer.report.diagnosis_results import largest_change
 
     if not largest_change(measured, corrected) and corrected.counts.sum() == measured.counts.sum():
         job.notes(["nothing shows what lies between the steps, so the output is left as it was"])

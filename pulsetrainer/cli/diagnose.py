@@ -49,8 +49,8 @@ def diagnose(
             progress=progress,
         )
         from pulsetrainer.files import store
+        from pulsetrainer.report.diagnosis_results import diagnosed
         from pulsetrainer.report.diagnosis_text import sections
-        from pulsetrainer.report.results import diagnosed
 
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
         known = set(store.read_header(model).provenance.inputs.values())

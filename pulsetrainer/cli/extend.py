@@ -31,9 +31,9 @@ def extend(
     """
     job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
     from pulsetrainer.files import provenance, store
+    from pulsetrainer.report.diagnosis_results import doubts_of
+    from pulsetrainer.report.diagnosis_results import extended as extended_by
     from pulsetrainer.report.facts import extension_words
-    from pulsetrainer.report.results import doubts_of
-    from pulsetrainer.report.results import extended as extended_by
 
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)

@@ -9,8 +9,8 @@ import pytest
 import store_examples
 
 from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.report.diagnosis_results import doubts_of, extended
 from pulsetrainer.report.facts import extension_words, facts
-from pulsetrainer.report.results import doubts_of, extended
 
 MIDDLE = "share of the middle one of several time constants (1: it is the only one)"
 
