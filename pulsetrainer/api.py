@@ -21,6 +21,7 @@ from pulsetrainer.device.limits import Limits, Rehearsal
 from pulsetrainer.device.schemes import find_opener
 from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
+from pulsetrainer.files.output_name import check_artefact_name
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
 from pulsetrainer.steps.import_ import import_parts
@@ -66,7 +67,8 @@ def save(
     ArgumentError
         It is not an artefact.
     UsageError
-        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
+        The file exists and ``overwrite`` is not set, its folder is missing or not writable, or its name ends
+        like a table or a figure.
     DataError
         The disk is full or failed.
 
@@ -77,6 +79,7 @@ def save(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     pt.save(model, pathlib.Path(folder) / "copy.h5")
     """
+    check_artefact_name(Path(path), "an artefact is saved as HDF5")
     header = provenance.make_header(
         title or f"{artefact.kind} saved from Python",
         program="Python",  # what was done there nobody can tell but whoever did it
@@ -111,6 +114,10 @@ def open_device(
     ...     device.info.current_limit_A
     1.5
     """
+    if port is not None and not port.strip():
+        raise UsageError(
+            "`port` must name a port, got an empty text", hint='the simulated device is "bench:"'
+        )
     known = _known_gains(tuned)
     device = _device.open_device(port, limits=limits)
     try:

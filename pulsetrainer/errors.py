@@ -61,7 +61,8 @@ class EndingError(UsageError):
     """The name of an output promises another format than it gets, or none; the hint has a better one."""
 
     def __init__(self, path: Path, what: str, ending: str, *, usual: str = "out", then: str = "") -> None:
-        got = f"ends in {path.suffix.lower()!r}" if path.suffix else "has no such ending"
+        without = "is an ending without a name" if path.name.startswith(".") else "has no such ending"
+        got = f"ends in {path.suffix.lower()!r}" if path.suffix else without
         other = path.parent / f"{path.stem.removesuffix(ending).strip('-. ') or usual}{ending}"
         super().__init__(f"{what}, but {path} {got}", hint=f"name it {shlex.quote(str(other))}{then}")
 

@@ -178,7 +178,7 @@ _WORDS_IN_QUOTES = {
         "did you mean normal?",
     ),
     "an ending without a name": (
-        *(("plot", "run.h5", "-o", ".png"), ".png has no such ending", "name it figure.png"),
+        *(("plot", "run.h5", "-o", ".png"), ".png is an ending without a name", "name it figure.png"),
     ),
     "settings of another format": (
         *(("tune", "-o", "tuned.yaml"), "tuned.yaml ends in '.yaml'", "name it tuned.toml"),
@@ -378,6 +378,12 @@ _WORDS_OF_A_TIRED_HAND = {
     "a table for a device": ("export run.h5 -o /dev/full", 2, "/dev/full is not an ordinary file", "on disk"),
     "settings without an ending": (
         *("tune -o pulsetrainer", 2, "pulsetrainer has no such ending", "name it pulsetrainer.toml"),
+    ),
+    "an ending without a name for a model": (
+        "identify run.h5 -o .h5",
+        2,
+        ".h5 is an ending without a name",
+        "name it out.h5",
     ),
     "another ending in another folder": (
         *("identify run.h5 -o other/out.csv", 2, "other/out.csv ends in '.csv'", "name it other/out.h5"),

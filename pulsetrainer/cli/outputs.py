@@ -8,11 +8,8 @@ from pathlib import Path
 import typer
 
 from pulsetrainer.errors import EndingError, UsageError
+from pulsetrainer.files.output_name import FORMATS, check_artefact_name
 
-_FORMATS = {
-    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".yaml", ".yml"),
-    *(".npz", ".mat", ".wav", ".png", ".svg", ".pdf", ".html", ".htm"),
-}
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
 
@@ -33,19 +30,20 @@ def check_ending(path: Path, context: typer.Context) -> None:
     """Refuse an output whose name promises another format than it gets."""
     command, ending = context.info_name, path.suffix.lower()
     if str(path) == str(context.params.get("html")):
-        what, right, then = "a page is written as HTML", ".html", "; a browser prints it to PDF"
+        _check_text(path, "a page is written as HTML", ".html", "; a browser prints it to PDF")
     elif command == "tune":
-        what, right, then = "a file of settings is written as TOML", ".toml", ""
-    elif command in _WRITE_NO_ARTEFACT:
-        return
-    else:
-        what, right = f"{command} writes HDF5", ".h5"
+        _check_text(path, "a file of settings is written as TOML", ".toml", "")
+    elif command not in _WRITE_NO_ARTEFACT:
         then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
         if ending == ".html" and "html" in context.params:
             then = f", and the page with --html {path}"
-    # a browser goes by the ending, and a file of settings without one would not be found again
-    formats = _FORMATS if right == ".h5" and path.name != "-" else _FORMATS | {""}
+        check_artefact_name(path, f"{command} writes HDF5", then=then)
+
+
+def _check_text(path: Path, what: str, right: str, then: str) -> None:
+    """A browser goes by the ending, and a file of settings without one would not be found again."""
+    ending = path.suffix.lower()
     if path.is_dir() or path.is_char_device():  # which is told when it is looked at
         return
-    if ending in formats and not (ending and right.startswith(ending)):  # .htm is a page too
+    if ending in FORMATS | {""} and not (ending and right.startswith(ending)):  # .htm is a page too
         raise EndingError(path, what, right, then=then)

@@ -218,6 +218,23 @@ def test_a_traceback_says_what_to_do(tmp_path, call, said):
     assert "--" not in last
 
 
+@pytest.mark.parametrize("name", ["out.csv", "figure.PNG", ".h5", "-"])
+def test_an_artefact_gets_no_name_that_promises_another_format(tmp_path, name):
+    """HDF5 in a file called .csv would be taken for a table."""
+    with pytest.raises(UsageError, match="is saved as HDF5, but") as caught:
+        pt.save(pt.load(KEPT / "model.h5"), tmp_path / name)
+    assert ".h5" in caught.value.hint
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("port", ["", " "])
+def test_a_port_that_was_left_empty_is_not_the_simulated_device(port):
+    """As --port "" at a shell."""
+    with pytest.raises(UsageError, match="must name a port") as caught:
+        pt.open_device(port)
+    assert "bench:" in caught.value.hint
+
+
 @pytest.mark.parametrize("name", sorted(VERBS))
 def test_help_is_readable(name):
     """No address of a function, no quotes around a type; progress and seed are told with the rest."""

@@ -1,0 +1,23 @@
+"""The name of a file that is written: it must not promise another format than the file has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pulsetrainer.errors import EndingError
+
+FORMATS = {
+    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".yaml", ".yml"),
+    *(".npz", ".mat", ".wav", ".png", ".svg", ".pdf", ".html", ".htm"),
+}
+
+
+def check_artefact_name(path: Path, what: str, *, then: str = "") -> None:
+    """Raise EndingError where the ``path`` of an artefact ends like another format, or is an ending alone.
+
+    ``-`` is no name either: an artefact is not written to standard output.
+    """
+    if path.is_dir() or path.is_char_device():  # which is told when it is looked at
+        return
+    if path.name.lower() in FORMATS | {"-"} or path.suffix.lower() in FORMATS - {".h5"}:
+        raise EndingError(path, what, ".h5", then=then)
