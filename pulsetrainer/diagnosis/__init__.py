@@ -1,1 +1,1 @@
-"""Diagnosis: what a model gets wrong, the cause by name, the extended model, and how it is inverted."""
+"""Diagnosis: what a model gets wrong and why, by name, with the extended model and its inverse."""

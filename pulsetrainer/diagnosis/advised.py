@@ -1,4 +1,4 @@
-"""What to record next, in words: experiments, in levels, rates and times of the device that was recorded."""
+"""What to record next, in words: experiments, with levels, rates and times that suit the device."""
 
 from __future__ import annotations
 

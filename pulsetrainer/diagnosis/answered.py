@@ -1,4 +1,4 @@
-"""From what a diagnosis knows at its end to the artefact, with the model extended by what was found."""
+"""The artefact made from the final state of a diagnosis, with the model extended by what was found."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """An input that is read in coarse steps though it moved evenly, as by a coarse ammeter.
 
-Where the reading steps, the input passed the middle of the step. From one middle to the next it is followed
-straight; where the reading stays longer than its neighbours, the input rests there. An output that moves as
-much while the reading stays as where it steps has seen that input; one that moves with the steps saw those.
+Where the reading steps, the input passed the middle of the step. From one middle to the next the input is
+taken to be straight; where a reading stays longer than its neighbours, the input rested there. An output
+that moves as much between the steps as at them shows such an even input. One that moves only with the steps
+shows that the device saw the steps.
 """
 
 from __future__ import annotations

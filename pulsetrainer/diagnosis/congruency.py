@@ -2,14 +2,15 @@
 
 All minor loops between the same two turning points are congruent in a Preisach operator, whatever its
 weights and whatever came before (Mayergoyz, Mathematical Models of Hysteresis, 2003, section 1.2). So the
-differences between such loops hold nothing of the weights, of how finely they are drawn, or of anything
-that depends on the rate alone; a feedback of the output into the input is seen in them, since loops of
-another history lie at another output. On the whole record the weights would swallow nearly all of it.
+differences between such loops contain nothing of the weights, of the fineness of the levels, or of anything
+that depends on the rate alone. But they do show a feedback of the output into the input, since loops with
+another history lie at another output. On the whole record the weights would absorb nearly all of it.
 
-Of every loop between turns A and B the residual is averaged in places along its two branches; what is left
-after a constant, a slope in time and the mean over the loops of one kind are taken off is its contrast.
-The cause's own contrast, simulated with the fitted weights, is fitted to it. Under the null the loops of
-one kind may be exchanged, which gives an exact test (Good, Permutation Tests, 2000).
+For every loop between turns A and B the residual is averaged at places along its two branches. A constant,
+a slope in time and the mean over the loops of one kind are subtracted; the remainder is the *contrast* of
+the loop. The contrast that the cause would make, simulated with the fitted weights, is fitted to it. If the
+cause is not there, the loops of one kind may be exchanged, which gives an exact test (Good, Permutation
+Tests, 2000).
 """
 
 from __future__ import annotations

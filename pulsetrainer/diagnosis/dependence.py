@@ -1,11 +1,11 @@
-"""Which state of the device explains what is left: each one of a bank is scored on time that was left out.
+"""Which state of the device explains the residual: each state of a bank is scored on time left out.
 
-For each kind of state and each time constant of a grid the columns are curves over the state, added to the
-output or to its gain, less what the weights and the causes in the model can do. A ridge fit on the rest of
-the time predicts each of a few whole pieces of the record; the score is the fall of the squares there. The
-same is done with noise that looks like what the best state leaves, again and again: the p-value is the
-share of draws of which any state of the bank scores as much (Davison and Hinkley, Bootstrap Methods and
-their Application, 1997, section 4.2).
+The columns of a fit are curves over the state, added to the output or to its gain, less what the weights and
+the causes in the model can do; there are some for each kind of state and each time constant of a grid. A
+ridge fit on the rest of the time predicts each of a few whole pieces of the record. The score is the fall of
+the squares there. The same is done again and again with noise that looks like what the best state leaves.
+The p-value is the share of draws in which any state of the bank scores as much (Davison and Hinkley,
+Bootstrap Methods and their Application, 1997, section 4.2).
 """
 
 from __future__ import annotations

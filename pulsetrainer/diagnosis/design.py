@@ -9,9 +9,10 @@ columns of offset and start, and B the rows in node space, which have some seven
 
     D = B A - F F'B A.
 
-What the device did before a record began goes on decaying in it: a finger that was pressed relaxes for
-seconds. No record tells how much, so a few exponential decays from its first sample are fitted freely, as the
-offset is, and taken off everything else (left out, a creep's time constant came out 15 % too short).
+The after-effects of what the device did before a record decay in it: a finger that was pressed relaxes for
+seconds. No record shows how large they are. So a few exponential decays from its first sample are fitted
+freely, as the offset is, and projected off everything else. (Without them the time constant of a creep came
+out 15 % too short.)
 """
 
 from __future__ import annotations

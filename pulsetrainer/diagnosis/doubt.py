@@ -1,4 +1,4 @@
-"""How far the sums of squares of two fits may differ though neither fit is better."""
+"""How far the sums of squares of two fits may differ although neither fit is better."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evidence as data: what was seen, of which cause, with which figures. ``wording`` puts it into words."""
+"""Evidence as data: what was seen, for which cause, with which figures. ``wording`` puts it into words."""
 
 from __future__ import annotations
 

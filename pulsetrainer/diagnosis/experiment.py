@@ -1,8 +1,8 @@
 """What to measure next: the excitation on which causes that are tied look least alike.
 
-Each of a few short experiments is played to the model that was found. What every tied cause would change in
-its output, less what the weights can do, and less what the other one could do in its place, is what is left
-to tell the two by. The best experiment is the one on which the closest two leave most.
+Each of a few short experiments is simulated with the model that was found. Each tied cause would change the
+output. Of that change, the weights can do a part, and another tied cause can do a part; the remainder is
+what distinguishes the two. The best experiment is the one with the largest remainder for the closest pair.
 """
 
 from __future__ import annotations

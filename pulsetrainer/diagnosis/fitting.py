@@ -1,10 +1,10 @@
 """The joint refit: weights and the parameters of all causes at once.
 
-For given parameters the static weights solve a non-negative problem whose right side is the output less
-what the output causes add; the parameters follow by Gauss-Newton on columns from which everything that
-the weights can do has been projected away (variable projection: Golub and Pereyra, SIAM J. Numer. Anal.
-10, 1973; Kaufman, BIT 15, 1975). Fitting a cause to the residual of a fitted model instead shrinks it: the
-weights have already swallowed most of it.
+For given parameters of the causes the static weights solve a non-negative problem. Its right side is the
+output less what the causes of the output add. The parameters follow by Gauss-Newton on columns from which
+everything that the weights can do has been projected away (variable projection: Golub and Pereyra, SIAM J.
+Numer. Anal. 10, 1973; Kaufman, BIT 15, 1975). To fit a cause to the residual of a fitted model instead would
+make it too small: the weights have already absorbed most of it.
 """
 
 from __future__ import annotations

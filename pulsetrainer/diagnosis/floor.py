@@ -1,8 +1,8 @@
 """How small an error can be, and how large an effect must be to be relevant.
 
-What no cause can lower is the noise of the averages and the discretisation error, of the plane's levels and
-of an input that is read in coarse steps; an effect smaller than the latter, than 0.3 of the former or than
-0.03 % of the span is irrelevant, however significant it is.
+No cause can lower the noise of the averages, nor the discretisation error: that of the plane's levels, and
+of an input that is read in coarse steps. An effect is irrelevant, however significant it is, if it is smaller
+than the discretisation error, than 0.3 of the noise, or than 0.03 % of the span.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """The dual and the signed form of the static model in a diagnosis.
 
 Direct and signed weights enter the output linearly, so they are refitted beside every cause. Those of the
-dual form do not: y = P^-1[u]. There the model as given stays, and what another choice of its weights would
-change is a signed operator beside it, small enough that the two are the same to first order:
+dual form do not: y = P^-1[u]. There the model as given stays, with a signed operator Q beside it. Q stands
+for the change that another choice of the weights would make; it is small, so that to first order the two are
+the same:
 
     y = P^-1[u] + Q[u]
 
-Once the causes are known, the static part of every form is identified again, from what the hysteresis alone
-would have given.
+Once the causes are known, the static part of every form is identified again, from the output that the
+hysteresis alone would have given.
 """
 
 from __future__ import annotations

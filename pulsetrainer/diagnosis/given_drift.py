@@ -1,13 +1,14 @@
 """A drift that shows against the model as given, where refitted weights hide it.
 
-Weights that are refitted to a record hold much of a drift that is over before the input has gone through its
-range twice: what is left says neither where it began nor how fast it went. Where the model as given is far
-off, a drift of the zero is therefore fitted to what the given weights leave, which move with nothing:
+Weights that are refitted to a record absorb much of a drift that is over before the input has gone through
+its range twice. What they leave shows neither where the drift began nor how fast it went. If the model as
+given is far off, a drift of the zero is therefore fitted to what its fixed weights leave:
 
     y - M(u) - d(u) = b + drift(t)
 
-with d what other causes add, if the model as given is nearer with them. It counts where with it, and no
-shift b, that model is near, and nearer than with another gain and zero, and its interval does not span zero.
+where d is what other causes add, if they bring the model as given nearer. The drift counts if three things
+hold: with it, and without a shift b, that model is near; it is nearer than with another gain and zero; and
+the interval of the drift does not span zero.
 """
 
 from __future__ import annotations

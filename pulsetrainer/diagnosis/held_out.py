@@ -1,8 +1,8 @@
 """Errors on blocks that were left out of the fit.
 
-Blocks are cut where a major loop wipes the memory out; predictions always run from the start of the
-record. Weights, parameters, offset and start are refitted on the rest, linearised around the joint fit, with
-the cells that are positive there.
+A record is cut into blocks where a major loop wipes the memory out. Weights, parameters, offset and start are
+refitted without some blocks, linearised around the joint fit, with the cells that are positive there.
+Predictions of the blocks left out always run from the start of the record.
 """
 
 from __future__ import annotations

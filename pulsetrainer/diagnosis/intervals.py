@@ -1,11 +1,15 @@
 """How sure the parameters of the causes found are: 95 % intervals.
 
-The spread is the larger of two: of the joint refit, linearised, on redrawn noise (a parametric bootstrap);
-and of the jackknife over blocks, which also sees what the fitted model misses. Added to it, as independent
-errors, are the discretisation error, as if a fifth of it were aligned; the moment of sampling, since input
-and output belong together to a fifth of a sample step only (each has its filter, and converters are read in
-turn); and what the estimates would be under formulas as plausible as those of the library
-(``Cause.variants``). The moment of a sudden change has none of it, but all moments that fit as well
+The spread is the larger of two: that of the joint refit, linearised, on redrawn noise (a parametric
+bootstrap), and that of the jackknife over blocks, which also sees what the fitted model misses. Three errors
+are added to it, as independent ones:
+
+- the discretisation error, as if a fifth of it were aligned with the parameter;
+- the moment of sampling, since input and output belong together only to a fifth of a sample step (each has
+  its filter, and converters are read in turn);
+- how far the estimates move under formulas as plausible as those of the library (``Cause.variants``).
+
+The interval of the moment of a sudden change is made otherwise: it holds all moments that fit as well
 (``moments``).
 """
 

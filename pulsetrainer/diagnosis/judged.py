@@ -1,4 +1,4 @@
-"""What the model as given says of the records, before any weight is refitted."""
+"""What the model as given predicts for the records, before any weight is refitted."""
 
 from __future__ import annotations
 

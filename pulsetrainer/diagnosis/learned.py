@@ -1,4 +1,4 @@
-"""What a learned dependence says: in words, with a figure of its curve, and as causes of the diagnosis."""
+"""A learned dependence in words, as a figure of its curve, and as causes of the diagnosis."""
 
 from __future__ import annotations
 

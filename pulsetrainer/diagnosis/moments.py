@@ -1,16 +1,17 @@
 """When something happened: the moments at which a sudden change fits as well as at the best one.
 
-Along the time of a step the fit has many lows, and a refit stays in the one where it began; nor does the
-curvature at a low tell how far away others are as deep: a gain that changes while the output rests near its
-zero does not show before that moves again. So the strengths are fitted anew at moments ever farther from a
-given one, which is linear, as sharp as the samples show them, with all that the weights and the other causes
-can do taken off. At a moment t of the true one the squares S(t) are larger than the least by chance only:
+As a function of the moment of a step the sum of squares has many minima, and a refit stays in the one where
+it began. Nor does the curvature of a minimum show how far away others are as deep: a gain that changes while
+the output rests near its zero does not show before the output moves again. So the strengths are fitted anew
+at moments farther and farther from a given one. That fit is linear, with the change as sharp as the samples
+show it, and with all that the weights and the other causes can do projected off. At the true moment t the
+squares S(t) are larger than the least, S(t*), by chance only:
 
     (S(t) - S(t*)) |d|^2 / var(d'n) <= -2 log(1 - sqrt(0.95)) = 7.35    in 95 of 100
 
-with d what the two change, and n the noise as it is (Hansen, Econometrica 68, 2000, theorem 2: of a moment
-that is searched for it is not chi-square). What the error of the levels may have in
-common with d is added.
+where d is the difference between the two changes, and n the noise as it is (Hansen, Econometrica 68, 2000,
+theorem 2: for a moment that is searched for the distribution is not chi-square). What the error of the levels
+may have in common with d is added.
 """
 
 from __future__ import annotations

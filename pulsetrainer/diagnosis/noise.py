@@ -1,15 +1,16 @@
 """The noise of a record as it is: its spectrum, and how it grows with the output's level.
 
-Noise n_t = s_t x_t, where s follows the level of the output and x is stationary with the density S(f). Both
-are read off a residual from which all that weights and causes could explain has been taken: what is missing
-there at some frequencies is told by white probes that go the same way, and put back. Bands of the spectrum
-are medians, so that a line in it is no noise. A sum c'n then has the variance
+The noise is n_t = s_t x_t, where s follows the level of the output and x is stationary with the density S(f).
+Both are estimated from a residual from which all that weights and causes could explain has been removed. That
+removes some noise too. White probes that are treated in the same way show how much is missing at each
+frequency, and it is put back. Bands of the spectrum are medians, so that a single line does not count as
+noise. A sum c'n then has the variance
 
     sum over f of S(f) |FFT(s c)(f)|^2 / N
 
-of the record padded with as many zeros, so that its ends do not meet. How large the noise is, whatever is
-still missing in a model, is told by ``quiet_square``: where the input rests, or is slow, octave by octave,
-the largest averages left out. What is slower than its octaves is continued from them.
+with the record padded with as many zeros, so that its ends do not meet. How large the noise is, whatever a
+model still misses, is estimated by ``quiet_square``. It looks where the input rests or is slow, octave by
+octave, and leaves out the largest averages. Noise slower than these octaves is extrapolated from them.
 """
 
 from __future__ import annotations

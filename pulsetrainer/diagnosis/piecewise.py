@@ -1,13 +1,13 @@
 """The inverse piece by piece: for a target that has no end, and whose future is not known.
 
-Each piece begins with the memory that the piece before left: the relays', the causes', the correction's. Of a
-static model that is the whole inverse, cut. The inverse of an extended model iterates as in
-``extended``,
+Each piece begins with the memory that the piece before it left: that of the relays, of the causes and of the
+correction. For a static model this is the whole inverse, cut into pieces. The inverse of an extended model
+iterates as in ``extended``,
 
     r <- r + 0.8 F[y_ref - M(u)],   u <- P^-1(r),
 
-over a piece and what comes after it, as far as that is known: F is not causal, and a lag wants to be met
-before it shows. What was found for the piece ahead is where the next iteration begins.
+over a piece and what comes after it, as far as that is known: F is not causal, and a lag must be countered
+before it shows. The next iteration begins with what was found for the piece ahead.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Whether all branches of a loop pass through one point within it, as those of a memristor do at zero.
 
 A resistor with a memory, y = G(w) u with a state w of its own, has no output where it has no input, whatever
-its state. The loops of a Preisach operator are widest within: its weights close them at an end of the input's
-range only, or where they leave a gap of no hysteresis at all (and then they describe the record). A butterfly
+its state. The loops of a Preisach operator are widest inside the range. Its weights close a loop only at an
+end of the range, or at a gap without any hysteresis (and then the weights describe the record). A butterfly
 crosses itself too, but there one branch rises where the other falls.
 """
 

@@ -1,7 +1,7 @@
 """How a verdict is reached: the stages, one after another.
 
-Each stage is a file of its own in ``stages``, takes what is known and returns what is known after it. What a
-number decides is written beside it in ``thresholds``, or in the file of its cause.
+Each stage is a file of its own in ``stages``: it takes what is known before it and returns what is known
+after it. What each number decides is written beside it in ``thresholds``, or in the file of its cause.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a record shows before any model: noise without a hum, steps, and the gates that fired on it."""
+"""What a record shows before any model is fitted: noise without a hum, steps, and the gates that fired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a residual is: against rate, level, direction, time and frequency."""
+"""Where a residual is large: by rate, level, direction, time and frequency."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
 """The record's own units: no decision depends on seconds, amperes or newtons.
 
-Causes are sought in these units and told in those of the record:
+Causes are sought in the following units, and reported in those of the record:
 
     (u - low) / (high - low),    (y - mean of y) / span of y,    t / second,
 
 so that a record whose time, input or output is multiplied by a number, or shifted, gives the same answer.
 The second of a record follows from how fast its input moves: it is 4.3 crossings of its range at the typical
 rate, which is the geometric mean over equal pieces of the input's path. Holds have no path, so they do not
-count; noise is taken off the input before. A record that hardly moves in all its time, as a step and a long
-hold, has no such rate: its second is a share of its length.
+count; noise is taken off the input before. A record in which the input hardly moves, such as a step and a
+long hold, has no such rate: its second is a share of its length.
 """
 
 from __future__ import annotations

@@ -1,18 +1,22 @@
 """The fast screen: how much of a residual each cause could explain, and how much it would by chance.
 
-For every start value of every cause not yet in the model: the change of the output that it makes, less what
-the weights can do, is a column; the score is the fall of the sum of squares when the column (or the few
-columns of one block) is fitted to the residual. That is a linearisation around the fitted model: it ranks
-in a second, but shrinks strong causes; ``fitting.refit`` gives the figures.
+Every cause that is not in the model yet has start values. Each of them gives a column: the change of the
+output that the cause makes, less what the weights can do. The score is the fall of the sum of squares when
+the column (or the few columns of one block) is fitted to the residual. That is a linearisation around the
+fitted model: it ranks all causes in a second, but makes strong ones too small. ``fitting.refit`` gives the
+figures.
 
-The null distribution is that of the most unlikely score over the whole library on noise like that of the
-record (``noise``): its spectrum and its dependence on the level, read off what no cause can explain. Noise
-has a normal distribution along the columns, whose covariance that spectrum gives, so that each block's
-score has a known one: chi-square. The smallest such p over the library is drawn again and again. Exact in
-it: the projection, the minimum over the library, the refit of the offset and of all weights that are
-positive. What is chosen from the data is chosen anew in each draw: a line's smallest p over all frequencies
-is known (Baluev, MNRAS 385, 2008, equation 6), and a step is tried at all its moments. Not exact: weights
-at zero stay there, and other parameters that enter nonlinearly are taken on the grid of start values.
+The null distribution is that of the most unlikely score in the whole library on noise like that of the
+record (``noise``). Its spectrum and its dependence on the level are estimated from what no cause can explain.
+Along the columns such noise is normally distributed, with a covariance that follows from the spectrum. The
+score of each block therefore has a known distribution, chi-square. The smallest p over the library is drawn
+again and again.
+
+The projection, the minimum over the library, and the refit of the offset and of all positive weights are
+exact. What is chosen from the data is chosen anew in each draw: the smallest p of a line over all frequencies
+is known (Baluev, MNRAS 385, 2008, equation 6), and a step is tried at all its moments. Two things are not
+exact: weights at zero stay there, and other parameters that enter nonlinearly are taken on the grid of start
+values.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a diagnosis is asked, and what it knows after each stage."""
+"""The question of a diagnosis, and what is known after each stage."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Every number that decides something in a diagnosis; those of one cause are in the file of that cause.
 
 Where a line names no other origin, the number was set on the tuning seeds of docs/blind.md (4242, 7000 to
-7302, 500000 to 500109) and then frozen; the grids of that page judged it on other seeds.
+7302, 500000 to 500109) and then frozen. The grids of that page tested it on other seeds.
 """
 
 from __future__ import annotations

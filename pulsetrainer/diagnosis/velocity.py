@@ -1,9 +1,9 @@
 """Whether the output follows the velocity of the input: then a Preisach model is the wrong one.
 
 A Preisach operator with weights mu >= 0 lags behind its input: over a closed cycle its loop turns one way.
-A damper or a friction force leads it: it jumps when the motion turns, and depends on how fast it goes. No
-choice of weights repairs that, whatever the polarity. The test needs no model of the damper: the mean of
-the output over groups of equal velocity, f(v), is compared with the fitted operator.
+The force of a damper or of friction leads the input: it jumps when the motion turns, or depends on how fast
+the motion is. No choice of weights repairs that, whatever the polarity. The test needs no model of the
+damper: the mean of the output over groups of equal velocity, f(v), is compared with the fitted operator.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""What settles from the beginning of a record; heat in a short one, and a sudden change, look like it.
+"""What settles from the beginning of a record: heat in a short record, and a sudden change, look like it.
 
     y - (1 - e^(-x / l)) (k (y - y0) + b),    x the time, or the way of the input
 
-Against heat the gain alone wears off (b = 0). It is no cause of the library: one record does not tell it from
-a gain that wanders. Where it fits as well, what was found does not go into a model, which would go on with it
-in the next record; and what settles is no step, and not taken out of the record as one.
+As a rival of heat only the gain wears off (b = 0). Such wear is no cause of the library: one record cannot
+distinguish it from a gain that wanders. If it fits as well as the heat that was found, that heat does not go
+into a model, which would carry it into the next record. What settles is no step either, and is not taken out
+of the record as one.
 """
 
 from __future__ import annotations

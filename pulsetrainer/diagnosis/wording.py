@@ -1,6 +1,6 @@
 """Evidence in words.
 
-Here and in ``advised`` a diagnosis is put into English, but for the texts that a cause's own file holds.
+Here and in ``advised`` a diagnosis is put into English, except for the texts in the files of the causes.
 """
 
 from __future__ import annotations

@@ -1,12 +1,18 @@
 """Acceptance: the best candidate that is relevant and predicts.
 
-Whether a candidate is significant at all was tested before it was refitted (``joint_fit``), which also puts
-the candidates in order. The first one is taken that the record can distinguish at all, and whose refit lowers
-the sum of squares by a relevant amount and the error on blocks that were left out by at least a twentieth of
-what can be lowered. One that falls just short is refitted until it converges before it is refused. One with
-several parameters that all run into their bounds is no longer the cause that it is named after, and is
-refused. If too few blocks are left to test it on, the fit alone decides. With a new cause in the model the
-error of the levels is estimated again: a missing cause makes that estimate too large, never too small.
+Whether a candidate is significant was tested before it was refitted (``joint_fit``), which also puts the
+candidates in order. The first one is accepted that meets these conditions:
+
+- its refit lowers the sum of squares by a relevant amount; a refit that falls just short is continued until
+  it converges;
+- it lowers the error on blocks that were left out of the fit by at least a twentieth of what can be lowered
+  there; if too few blocks are left to test this, the fit alone decides;
+- the record can distinguish it at all;
+- if it has several parameters, they do not all run into their bounds: it would no longer be the cause that it
+  is named after.
+
+With a new cause in the model the error of the levels is estimated again: a missing cause makes that estimate
+too large, never too small.
 """
 
 from __future__ import annotations
@@ -54,19 +60,19 @@ def stage(state: State) -> State:
 
 
 def _ran_away(term: Term, frame: Frame) -> bool:
-    """Whether all of several parameters lie at the ends of what is searched."""
+    """Whether a term has several parameters, and all of them lie at their bounds."""
     bounds = term.cause.quantities(frame)
     at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
     return len(at_end) > 1 and all(at_end)
 
 
 def _fall(state: State, trial: Fitted) -> float:
-    """Fall of the sum of squares by a trial, of the relevant one."""
+    """Fall of the sum of squares by a trial, as a multiple of the relevant fall."""
     return (state.current.squares - trial.squares) / state.floor.relevant
 
 
 def settled(problem: Problem, trial: Fitted) -> Fitted:
-    """Refit a model to the end; a cause of the input gets rows of its own, a sudden one its best moment."""
+    """Refit until it converges; a cause of the input gets rows of its own, a sudden one its best moment."""
     changes_input = any(term.cause.stage == "input" for term in trial.terms)
     fitted = refit(problem, trial.terms, trial, rebuild=changes_input)
     for _ in range(LIMITS.moments_moved):
@@ -78,7 +84,7 @@ def settled(problem: Problem, trial: Fitted) -> Fitted:
 
 
 def _moved(problem: Problem, fitted: Fitted) -> Fitted:
-    """Return a fit with its sudden causes at moments that leave less, or as it is where there are none."""
+    """Return a fit with its sudden causes at moments that leave less; the same fit where there are none."""
     for term in fitted.terms:
         if term.cause.sudden:
             known = profile(fitted, term)

@@ -1,9 +1,14 @@
 """Account: what speaks for the verdict, as data.
 
-It lists what the static model leaves and what it would leave if nothing were wrong; for each cause found,
-what its gate saw, or its p-value and share; what is left with all of them; where the rest is largest, if
-nothing explains it and it is more than noise; whether what is taken for noise is slow; whether the loop is
-pinched; which cause screening took for significant, if nothing was found; and what the records lack.
+It lists
+
+- what the static model leaves, and what it would leave if nothing were wrong;
+- for each cause found, what its gate saw, or its p-value and its share of the error;
+- what is left with all causes found;
+- where the rest is largest, if nothing explains it and it is more than noise;
+- whether what is taken for noise is slow, and whether the loop is pinched;
+- which cause screening took for significant, if none was found in the end;
+- what the records lack.
 """
 
 from __future__ import annotations
@@ -62,9 +67,9 @@ def stage(state: State) -> State:
 
 
 def _of(state: State, finding: Finding, *, beyond: bool) -> Evidence:
-    """What speaks for one cause; its share of the error only where there is one ``beyond`` noise.
+    """What speaks for one cause; its share only where there is an error ``beyond`` noise.
 
-    What tells a cause of the device from others is not cited of records without the rates or rests for it.
+    The signature of a cause of the device is not cited if the records lack the rates or rests to show it.
     """
     if finding.seen is not None:
         return finding.seen
@@ -76,7 +81,7 @@ def _of(state: State, finding: Finding, *, beyond: bool) -> Evidence:
 
 
 def _not_accepted(state: State) -> Iterator[Evidence]:
-    """What screening took for significant, and the refit did not bear out: the table shows its p-value."""
+    """What screening took for significant, but the refit did not confirm: the table shows its p-value."""
     for score in state.scores.scores[:1]:
         if score.p_value <= LIMITS.p_max:
             figures = {"p": score.p_value, "explains": state.explains(score.gain)}

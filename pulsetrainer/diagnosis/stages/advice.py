@@ -1,11 +1,16 @@
 """Advice: what to measure next.
 
-If the model as given is of the wrong kind, or of another condition, that comes first: another model is
-needed. If the device was still settling when the records began, it must rest first. If the model contains
-what was found already, it is used as it is. If causes are tied, the advice is the experiment on which they
-look least alike, simulated with the model that was found. Otherwise it is what the verdict asks for: a fault
-of the measurement is taken out of the record (`correct`), a property of the device goes into the model
-(`extend`). What the records lack comes after what can be done with them; it comes first if that is nothing.
+The first of these that applies is the advice:
+
+- If the model as given is of the wrong kind, or of another condition, another model is needed.
+- If the device was still settling when the records began, it must rest first.
+- If the model contains already what was found, it is used as it is.
+- If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
+  that was found.
+- Otherwise it is what the verdict asks for: a fault of the measurement is taken out of the record
+  (`correct`), a property of the device goes into the model (`extend`).
+
+What the records lack comes after what can be done with them, or first if nothing can be done with them.
 """
 
 from __future__ import annotations
@@ -56,7 +61,7 @@ def _of_the_conditions(state: State) -> Evidence | None:
 
 
 def _not_as_given(state: State) -> Evidence | None:
-    """Return what to do where nothing was found, but the model as given misses what refitted weights hold."""
+    """Return what to do if nothing was found, but the given model leaves more than refitted weights do."""
     missed = next((one.kind for one in state.evidence if one.kind in _NOT_AS_GIVEN), None)
     if missed is None or state.verdict not in ("none", "inconclusive", "unknown"):
         return None
@@ -89,7 +94,7 @@ def _of_the_causes(state: State) -> Evidence:
 
 
 def _at_the_mains(tied: Finding) -> dict[str, float]:
-    """Return the frequency of a disturbance, Hz, where it is one of the mains."""
+    """Return the frequency of a disturbance, Hz, if it is that of the mains or a harmonic of it."""
     lines = [one.value for one in tied.parameters if tied.cause.line and one.unit == "Hz"]
     mains = [k * one for one in LIMITS.mains_Hz for k in range(1, LIMITS.mains_harmonics + 1)]
     near = [one for one in lines if any(abs(one / usual - 1.0) <= LIMITS.mains_within for usual in mains)]

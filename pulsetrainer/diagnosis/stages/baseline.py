@@ -1,11 +1,15 @@
 """Baseline: a static model refitted to these records, and the floor under every model.
 
-The weights of a static Preisach model are fitted to the records, whatever the model as given says: what they
-leave is the baseline, which causes can lower. What no cause can lower is the noise of the averages, the steps
-of the output, and the error of the levels, which is estimated from how much a coarser plane leaves. An effect
-smaller than that error, than 0.3 of the noise or than 0.03 % of the span is irrelevant, however significant
-it is. What the records lack (several rates, holds, length) is noted here, since it limits what can be told
-apart later.
+The weights of a static Preisach model are fitted to the records, whatever the model as given predicts. The
+error that this refit leaves is the *baseline*. Causes can lower it, but no further than a *floor*: the noise
+of the averages, the steps of the output, and the error of the levels. (An *average* is the mean of the
+samples of a few milliseconds; the fits see averages only.) The error of the levels is that of cells with a
+finite width, and is estimated from how much more a coarser plane leaves. What lies between baseline and floor
+is *what can be lowered*.
+
+An effect that is smaller than the error of the levels, than 0.3 of the noise or than 0.03 % of the span is
+*irrelevant*, however significant it is. What the records lack (several rates, holds, length) is noted here,
+since it limits which causes can be told apart later.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """Begin: the model that goes on is also fitted to the beginning of the records, where it can be.
 
-The after-effects of what a device did before a record decay in it, so the search leaves the beginning of each
-record free (``design``). But a free beginning hides how a slow cause begins, and a model that is used
-elsewhere has none: it starts from rest. So the causes that repeat are refitted without it. That refit is the
-model if it leaves no relevantly larger error, or a smaller one, beginning included, after the first fifth of
-each record; otherwise something was going on before the records, and the beginning stays free.
+The after-effects of what a device did before a record decay in it, so the search fits the beginning of each
+record freely (``design``). But a free beginning hides how a slow cause begins, and a model that is used
+elsewhere has none: it starts from rest. So the causes that repeat are refitted without it. That refit becomes
+the model on either of two conditions: its error over the whole record is not relevantly larger, or it
+predicts what comes after the first fifth of each record better than the first fit does from rest. Otherwise
+something was going on before the records, and the beginning stays free.
 
-Both fits are of the same records, so the interval of a parameter covers the results of both. If it then spans
-zero for all strengths of a cause, that cause is in doubt, like any other with such an interval.
+Both fits are of the same records, so the interval of a parameter covers the results of both. If that interval
+then spans zero for all strengths of a cause, the cause is in doubt.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
-    """Return the state with the model of the causes that repeat as it goes on, and its parameters."""
+    """Return the state with the model that is passed on: the causes that repeat, and their parameters."""
     kept = state.repeated
     assert kept is not None
     if kept.terms:
@@ -44,12 +45,12 @@ def stage(state: State) -> State:
 
 
 def begins_at_rest(problem: Problem) -> Problem:
-    """Return a problem in which no record goes on from something that was before it."""
+    """Return a problem in which every record starts from rest, without a free beginning."""
     return replace(problem, bins=replace(problem.bins, begins_free=False))
 
 
 def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
-    """Return what was found with the intervals of both fits, in doubt where they leave room for nothing."""
+    """Return a finding with the intervals of both fits, in doubt if its strength may then be zero."""
     both = replace(found, parameters=_hull(found.parameters, others))
     strengths = both.cause.strengths_of(both.parameters) if found.found else ()
     if not may_be_nothing(strengths) or MAY_BE_NOTHING in found.doubts:
@@ -58,7 +59,7 @@ def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
 
 
 def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
-    """Return parameters with intervals that hold those of another fit to the same records too."""
+    """Return parameters with intervals that also cover those of another fit to the same records."""
     if [one.name for one in rows] != [one.name for one in others]:  # another number of curves
         return rows
     return tuple(
@@ -68,7 +69,7 @@ def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Est
 
 
 def late(fitted: Fitted) -> float:
-    """Variance of what a fit leaves after the beginning of each record, as the model goes on: from rest."""
+    """Variance of what a model leaves after the first fifth of each record, if it starts from rest."""
     bins, left = fitted.problem.bins, fitted.problem.measured - fitted.simulated
     ends = np.asarray([bins.time_s[bins.record == k].max(initial=0.0) for k in range(len(bins.number))])
     return float(np.var(left[bins.time_s > LIMITS.begin_share * ends[bins.record]]))

@@ -1,14 +1,19 @@
 """Backward elimination: a cause that the others have made superfluous is dropped.
 
-Each cause is taken out of the full model in turn. As long as the least important one makes no relevant
-difference, or less than a five hundredth of that of all together (the formulas of the others are not that
-exact), it is dropped. A cause is also dropped if time that was left out is predicted better without it: it
-was accepted before the others, and does harm beside them. The same holds if it takes away less than a third
-of what can be lowered on blocks that were left out, while more than noise is left with it or without it: any
-cause fits a device that is not a Preisach operator. A line of the spectrum that is most of what is left
-without it is not dropped for this: no error of a model looks like that, however badly blocks that were left
-out are predicted for other reasons. A single cause has proved itself against the baseline, and is dropped
-only for the last two reasons.
+Each cause is taken out of the full model in turn. The least important one is dropped if it makes no relevant
+difference. It is also dropped if it makes less than a five hundredth of the difference that all causes make
+together, since the formulas of the others are not that exact. This is repeated as long as a cause is dropped.
+
+There are two more reasons to drop a cause. A single cause, which has proved itself against the baseline, is
+dropped for these only:
+
+- Time that was left out is predicted better without the cause: it was accepted before the others, and does
+  harm beside them.
+- The cause takes away less than a third of what can be lowered on blocks that were left out. This counts only
+  if more than noise is left with the cause or without it: any cause fits a device that is not a Preisach
+  operator. A line of the spectrum that is most of what is left without it is not dropped for this reason. No
+  error of a model looks like such a line, however badly blocks that were left out are predicted for other
+  reasons.
 """
 
 from __future__ import annotations
@@ -48,17 +53,17 @@ def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
 
 
 def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
-    """The one of the models with one cause less that is no worse; None where all of them are."""
+    """The best of the models with one cause less, if it is no worse than the full one; else None."""
     weakest = min(without, key=lambda fitted: fitted.squares)
     least = max(state.floor.relevant, LIMITS.least_share * (state.baseline.squares - current.squares))
     return weakest if weakest.squares - current.squares < least else None
 
 
 def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
-    """The one of the models with one cause less of which that cause predicts least, if little.
+    """The model without the cause that predicts least, if that is little; else None.
 
-    Where only noise is left without it too, what was left out is noise for the most part, and nothing
-    predicts that.
+    If only noise is left without a cause too, the blocks left out hold mostly noise, which nothing
+    predicts: such a cause is not considered.
     """
     without = [
         fewer
@@ -73,16 +78,16 @@ def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> 
 
 
 def _is_a_line(state: State, current: Fitted, fewer: Fitted) -> bool:
-    """Whether what one model has more is a line of the spectrum, and most of what the other leaves."""
+    """Whether the cause that ``fewer`` lacks is a line of the spectrum, and most of what ``fewer`` leaves."""
     (term,) = (term for term in current.terms if term.cause.id not in fewer.names)
     strong = fewer.squares - current.squares > LIMITS.half * fewer.squares
     return term.cause.line and strong and not term.cause.in_step(term.values, state.problem.frames)
 
 
 def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
-    """The one of the models with one cause less that predicts best, if better than with all of them.
+    """The model with one cause less that predicts best, if better than the full one; else None.
 
-    Both blocks that alternate and whole pieces of the time must say so.
+    Both alternating blocks and whole pieces of the time must show it.
     """
     best = min(without, key=state.held_out.error)
     if not state.held_out.gain(best, current, state.floor) < 0:  # NaN: it cannot be told

@@ -1,12 +1,15 @@
 """Equal loops: a cause that the weights can absorb is sought where they cannot.
 
 The weights can absorb a feedback of the output into the input almost entirely, so that no refit shows it. But
-all minor loops between the same two turns are congruent in a Preisach model, whatever its weights; their
-differences are tested by exchanging the loops, in standard errors over them, at p of at most 0.001. The cause
-is dropped if its strength runs into its bound, or if the rest of the record contradicts it: with it in the
-model the sum of squares must not rise by a relevant amount. The test is not made if much is unexplained or
-jagged, since either makes equal loops differ (decision 042), nor for the dual form, whose loops between equal
-turns of the input are not congruent.
+in a Preisach model all minor loops between the same two turns are congruent, whatever its weights.
+Differences between such loops are therefore tested, in standard errors over the loops, by exchanging the
+loops among each other; p must be at most 0.001. The cause is dropped if its strength runs into its bound. It
+is also dropped if the rest of the record contradicts it, that is, if the sum of squares rises by a relevant
+amount with it in the model.
+
+The test is not made if more than noise is unexplained, or if the output is jagged, that is, sticks or comes
+in coarse steps: either makes equal loops differ (decision 042). Nor is it made for the dual form, whose loops
+between equal turns of the input are not congruent.
 """
 
 from __future__ import annotations

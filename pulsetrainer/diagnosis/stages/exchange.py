@@ -1,10 +1,11 @@
 """Exchange: each cause against the others of its family, its own other kinds, and its finer formula.
 
-When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
-every other variant of its own is fitted in its place, and the best is kept. The new one inherits the p-value
-of the old: the test was whether anything of this family is there, not which one (decision 044). A formula
-with one more parameter takes the place of its own only where neither noise nor what happens between two
-samples can make the difference, twice over.
+When a cause was chosen, others were still missing. So each cause is taken out, and every other cause of its
+family, and every other kind of its own, is fitted in its place. The best is kept. A new cause inherits the
+p-value of the old one: the test was whether anything of this family is there, not which one (decision 044).
+
+Some causes have a finer formula with one more parameter. It takes the place of the plain one only if the fits
+differ by more than twice what noise, and what happens between two samples, can make.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def stage(state: State) -> State:
 
 
 def _refined(state: State, term: Term) -> State:
-    """Return the state with the finer formula of a cause where the records show it, else the plain one."""
+    """Return the state with the finer formula of a cause if the records show it, else the plain one."""
     current, problem = state.current, state.problem
     coarser, finer = term.cause.coarser(), term.cause.finer(problem.frames[0])
     if coarser is None and not finer:
@@ -51,7 +52,7 @@ def _refined(state: State, term: Term) -> State:
 
 
 def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
-    """Whether the records show a finer formula, and leave its strengths apart from zero."""
+    """Whether the records show a finer formula, and the intervals of its strengths exclude zero."""
     noise = state.scores.noise
     if noise is None or plain.squares - fine.squares <= LIMITS.finer * doubt(fine, plain, noise):
         return False

@@ -1,13 +1,15 @@
 """Extension: the model with the causes that repeat; never one that predicts worse than the model given.
 
-The search judges a model on averages, with a free offset and a free beginning. What is used is a model on
-levels of its own, starting from rest. It is made here, and must predict these same records better than the
-model as given, by at least three fifths of what the causes gain in the search; otherwise nothing is added to
-the model. A cause that gains less was already under way before the record, and will begin differently in the
-next. Where the model as given contains these causes already, and no worse, that is said. What a fault of the
-measurement did to the records, and can be taken out of them, counts on neither side. Equal loops show a cause
-by differences that the weights can absorb, not by what it predicts: if the model gains nothing with it, it is
-tried without.
+The search judges a model on averages, with a free offset and a free beginning. The model that will be used
+has levels of its own, and starts from rest. It is made here. It must predict these same records better than
+the model as given, by at least three fifths of what the causes gain in the search; otherwise nothing is
+added. A cause that gains less was already under way before the record, and will begin differently in the next
+one.
+
+If the model as given contains these causes already, and is no worse, that is said. A fault of the measurement
+that can be taken out of the records counts on neither side of the comparison. Equal loops show a cause by
+differences that the weights can absorb, not by what it predicts. If the model gains nothing with such a
+cause, it is tried without.
 """
 
 from __future__ import annotations
@@ -60,7 +62,7 @@ def _extended(state: State, given: Model) -> State:
 
 
 def _why_not(state: State, better: bool, rest: float) -> str:
-    """Which evidence says why nothing is added, where that needs so long a ``rest`` to settle."""
+    """Kind of the evidence that says why nothing is added; ``rest`` is how long the device settles."""
     assert state.repeated is not None
     if better:
         return "no gain"
@@ -70,7 +72,7 @@ def _why_not(state: State, better: bool, rest: float) -> str:
 
 
 def _rest(state: State) -> float:
-    """How long the device must rest before a record, so that nothing is under way when it begins."""
+    """How long the device must rest before a record, so that nothing still settles when it begins."""
     assert state.repeated is not None
     times = [
         value
@@ -82,7 +84,7 @@ def _rest(state: State) -> float:
 
 
 def _without_contrast(state: State) -> State:
-    """Return the state without the causes that only equal loops showed in the model that goes on."""
+    """Return the state whose model that is passed on lacks the causes that only equal loops showed."""
     assert state.repeated is not None
     kept = [term for term in state.repeated.terms if term.cause.id not in state.by_contrast]
     findings = tuple(

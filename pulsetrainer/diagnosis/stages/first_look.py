@@ -1,7 +1,7 @@
 """First look: the answer of a quick diagnosis.
 
-Causes are only screened, and nothing is refitted: the best cause is found if it is significant and relevant,
-its strength is linearised and therefore too small, and causes with similar signatures (cosine above 0.9) are
+Causes are only screened, and nothing is refitted. The best cause is found if it is significant and relevant.
+Its strength is linearised and therefore too small. Causes with similar signatures (cosine above 0.9) are
 named beside it.
 """
 
@@ -40,7 +40,7 @@ def _finding(state: State, score: Score) -> Finding:
 
 
 def _alike(state: State, best: Score) -> tuple[str, ...]:
-    """Causes whose columns point the same way as those of the best."""
+    """Causes whose columns point the same way as those of the best cause."""
     return tuple(
         score.cause.id
         for score in state.scores.scores

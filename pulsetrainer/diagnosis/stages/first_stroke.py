@@ -1,10 +1,11 @@
 """First stroke: looked at again, now that causes are known.
 
 The first stroke of a device that was not cycled before differs from all later ones, and is left out before
-anything is fitted. If the device creeps, rings or runs in, the later strokes differ as well, and hide it. So
-it is looked for once more in the output less what the causes add; if it stands out there, it is left out, and
-the search begins again. If more than noise is left, the first stroke may have kept the causes from being
-found: the search is then tried without it, and that result counts if it leaves only noise.
+anything is fitted. If the device creeps, rings or runs in, the later strokes differ as well, and hide the
+first one. So it is looked for once more in the output less what the causes add. If it stands out there, it is
+left out, and the search begins again. If it does not, but more than noise is left, the first stroke may have
+kept the causes from being found. The search is then tried without it, and that result counts if it leaves
+only noise.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def stage(state: State) -> State:
 
 
 def _without(state: State, counts: Sequence[int]) -> State | None:
-    """Search again without so many samples at the beginning of each record; None where none can go."""
+    """Search again without the first ``counts`` samples of the records; None if none can be left out."""
     records, notes = list(state.question.records), []
     for k, (count, even) in enumerate(zip(counts, state.problem.records, strict=True)):
         weight = records[k].sample_weight.copy()

@@ -5,26 +5,34 @@ records.
 
 - If the output, of all records or of one, falls where the model rises, the polarity is reversed:
   `condition-change`, and all else is withdrawn.
-- If a mere function of the velocity describes the output much better, the model is of the wrong kind: causes
-  sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
-  else the cause is `unknown`.
-- If the model as given leaves less than the search's best, the search found only faults of its own coarser
-  levels: they are withdrawn. What the given model leaves may still be more than noise, and is then `unknown`;
-  otherwise the verdict is `none`, whatever the coarser levels could have shown.
-- If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
-  drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
-- If it is far off on records in which the input never turned, there is no verdict: a first stroke differs
-  from all later ones.
-- If it is far off though it was identified from these very records, nothing changed, and that is `unknown`.
-- If it is far off without that, the device is in another condition: `condition-change` comes first. Where
-  that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
-  withdrawn. There is no such change if the causes found, added to the prediction of the model as given, bring
-  it near; nor if refitted weights are far off too on blocks that were left out: then no Preisach model
-  describes the device, and that is `unknown`. Nor can a model of the wrong kind, by these records or by its
-  own, show a change. A mere shift is not a change if the input left the model's range: what was switched
-  there stays so, and looks like another zero.
+- If a mere function of the velocity describes the output much better, the model is of the wrong kind, and
+  causes sought on top of it are withdrawn. If the speed matters and not only the direction, the force is
+  `viscous`; otherwise the cause is `unknown`.
+- If the model as given leaves less than the best model of the search, the search found only faults of its own
+  coarser levels: they are withdrawn. What the given model leaves may still be more than noise, and is then
+  `unknown`; otherwise the verdict is `none`, whatever the coarser levels could have shown.
+- The model as given may be *far off* (1 % of the span) where refitted weights are not (they leave a fifth of
+  that). If a drift of the zero then brings it near, that drift is the finding: refitted weights hide a drift
+  that is over soon.
+- If the model is far off on records in which the input never turned, there is no verdict: a first stroke
+  differs from all later ones.
+- If it is far off although it was identified from these very records, nothing can have changed since, and the
+  verdict is `unknown`.
+- If it is far off for none of these reasons, the device is in another condition, and `condition-change` comes
+  first. If that change is all but a thousandth of the squared error, other causes would only repair the rest
+  of it, and are withdrawn.
 
-What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
+In these cases being far off is no change of condition:
+
+- The causes found, added to the prediction of the model as given, bring it near.
+- Refitted weights are far off too, on blocks that were left out: then no Preisach model describes the device,
+  and the verdict is `unknown`.
+- The model is of the wrong kind, as these records or its own show.
+- The zero alone seems to have moved, and the input left the model's range: what was switched there stays so,
+  and looks like another zero.
+
+What the raw data show stays found in every case. So does what equal loops show, unless the model is of the
+wrong kind.
 """
 
 from __future__ import annotations
@@ -87,7 +95,7 @@ def stage(state: State) -> State:
 
 
 def _changed(state: State, judged: Judged, noise_rms: float) -> Change | None:
-    """Return how the device changed since its model was made; None where it did not, or nothing tells."""
+    """Return how the device changed since its model was made; None if it did not, or if nothing shows it."""
     assert state.question.given is not None
     fit = state.question.given.model.fit
     if judged.speed.wrong or (fit is not None and fit.warning):
@@ -102,7 +110,7 @@ def _changed(state: State, judged: Judged, noise_rms: float) -> Change | None:
 def _of_a_change(
     state: State, judged: Judged, changed: Change, noise_rms: float
 ) -> tuple[State, list[Evidence]]:
-    """Tell what a change of the device against the model as given may be."""
+    """Decide what a difference between the device and the model as given may be."""
     if all(_is_one_stroke(one.input) for one in judged.records):
         given = left_by(judged.measured, judged.predicted, noise_rms) / changed.span
         nothing = state.verdict == "none"
@@ -124,7 +132,7 @@ def _is_one_stroke(u: FloatArray) -> bool:
 
 
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
-    """Say where nothing was found that the model as given leaves much more than refitted weights do."""
+    """Where nothing was found, say if the model as given leaves much more than refitted weights do."""
     refitted = state.scale.span * state.baseline.rms
     if state.verdict not in _NOTHING or _left_by_given(state, judged) <= LIMITS.given_worse * refitted:
         return []
@@ -146,7 +154,7 @@ def _is_its_own(state: State) -> bool:
 
 
 def _each_against(judged: Judged) -> Iterator[Evidence]:
-    """Yield how far each record is from the model as given: which of them differ from it, and how."""
+    """Yield, for each record, how far it is from the model as given, and in what way."""
     for k, (record, left) in enumerate(zip(judged.records, judged.residuals, strict=True)):
         kept = record.counts
         measured, error = record.output[kept], left[kept]
@@ -159,7 +167,7 @@ def _each_against(judged: Judged) -> Iterator[Evidence]:
 
 
 def _brought_near(state: State, judged: Judged, noise_rms: float) -> bool:
-    """Whether the causes found, added to what the model as given says, describe the records."""
+    """Whether the causes found, added to the prediction of the model as given, describe the records."""
     found = {one.cause.id for one in state.findings if one.found and not one.in_doubt}
     terms = [term for term in state.current.terms if term.cause.id in found]
     if not terms or not state.extends:
@@ -173,7 +181,7 @@ def _brought_near(state: State, judged: Judged, noise_rms: float) -> bool:
 def _drifted(
     state: State, judged: Judged, changed: Change, noise_rms: float
 ) -> tuple[State, list[Evidence]] | None:
-    """Return the state with the drift of the zero that the model as given tells; None where that is none."""
+    """Return the state with the drift of the zero that the model as given shows; None if it shows none."""
     told = given_drift.told(state, judged, changed, noise_rms)
     if told is None:
         return None
@@ -185,7 +193,7 @@ def _drifted(
 
 
 def _far_off(state: State, judged: Judged, changed: Change, noise_rms: float) -> tuple[State, list[Evidence]]:
-    """Tell another condition from a device that no refitted weights describe where they have not seen it."""
+    """Distinguish another condition from a device that refitted weights do not describe either."""
     span, percent = state.scale.span, PERCENT / changed.span
     given = left_by(judged.measured, judged.predicted, noise_rms)
     left_out = span * _left_out(state)
@@ -208,8 +216,8 @@ def _left_out(state: State) -> float:
 def _is_as_good(state: State, judged: Judged) -> bool:
     """Whether the model as given leaves no more than the search's best.
 
-    A cause is withdrawn only with as much noise on either side. Where none was found there is nothing to be
-    withdrawn, and the given model's own error counts, noise apart.
+    To withdraw a cause, both sides must contain the same noise. Where no cause was found, nothing can be
+    withdrawn, and only the given model's own error counts, without noise.
     """
     fitted = [one for one in state.findings if one.found and one.cause.stage != "record"]
     if any(one.cause.id not in state.by_contrast for one in fitted):
@@ -220,12 +228,12 @@ def _is_as_good(state: State, judged: Judged) -> bool:
 
 
 def _left_by_given(state: State, judged: Judged) -> float:
-    """Rms error of the model as given without the noise of single samples: slow noise averages have too."""
+    """Rms error of the model as given, without the noise of single samples; averages hold slow noise too."""
     return left_by(judged.measured, judged.predicted, state.scale.span * state.floor.quick.noise)
 
 
 def _unexplained(state: State, judged: Judged) -> bool:
-    """Whether the model as given misses something, noise apart, refitted or not."""
+    """Whether more than noise is left both by the model as given and by refitted weights."""
     span = state.scale.span
     left = _left_by_given(state, judged)
     if state.question.quick or left <= LIMITS.unexplained_span * span * state.floor.span:
@@ -234,7 +242,7 @@ def _unexplained(state: State, judged: Judged) -> bool:
 
 
 def withdrawn(state: State, told: Collection[str] = ()) -> State:
-    """Return a state in which only what was read off the raw data, and what is ``told``, stays found."""
+    """Return a state in which only what the raw data show, and the causes in ``told``, stay found."""
     findings = tuple(
         one if one.cause.stage == "record" or one.cause.id in told else replace(one, found=False)
         for one in state.findings
@@ -269,7 +277,7 @@ def _of_another_kind(state: State, judged: Judged) -> State:
 def _in_another_condition(
     state: State, changed: Change, polarity: int, record: int | None = None
 ) -> tuple[State, list[Evidence]]:
-    """Put the change of condition first; withdraw what only repairs the rest of it."""
+    """Put the change of condition first; withdraw causes that only repair the rest of it."""
     said = []
     if changed.is_everything:
         cleared = withdrawn(state, state.by_contrast)

@@ -1,14 +1,16 @@
 """Joint fit: the best of the significant candidates are refitted together with the weights.
 
-The weights have absorbed most of any effect, so that its fit to their residual comes out too small. The best
-three candidates are therefore fitted jointly: parameters of all causes and all weights at once. If the refit
-of one lowers nothing (a lag where the output leads), the next takes its turn. Beside a lag the other lags are
-tried too, starting from the same lateness: linearised from far away they are hardly distinguishable. A
-candidate must be significant, and its linearised score at least half of what is relevant, since the score
-shows less than a refit does. No candidate is tried from a family that is in the model already: what a cause
-of that family leaves is due to its imperfect formula, not to a second cause. The best fit comes first; but
-one with fewer parameters comes before it, if noise or what happens between two samples could make the
-difference.
+The weights have absorbed most of any effect, so a cause that is fitted to what they leave comes out too
+small. The three best candidates are therefore fitted jointly: the parameters of all causes and all weights at
+once. If the refit of a candidate lowers nothing (a lag, say, where the output leads), the next one takes its
+turn. If one of them is a lag, the other lags are tried too, starting from the same lateness: linearised from
+far away, lags hardly differ.
+
+A candidate must be significant, and its linearised score at least half of what is relevant, since the score
+shows less than a refit does. A *family* is a group of causes that look alike, such as the lags. No candidate
+is tried if its family is in the model already: what a cause leaves that looks like its family is due to its
+imperfect formula, not to a second cause. The best fit comes first. But a fit with fewer parameters comes
+before it, if noise or what happens between two samples could make the difference.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ def _of_best_kind(state: State, score: Score) -> Fitted:
 
 
 def _as_late(state: State, trials: list[tuple[Fitted, Score]]) -> list[tuple[Fitted, Score]]:
-    """Return refits of the lags that were not tried, begun where the best of those ended that were."""
+    """Return refits of the lags not tried yet, started from where the best of the tried ones ended."""
     terms = [
         term
         for trial, score in sorted(trials, key=lambda pair: pair[0].squares)
@@ -72,11 +74,11 @@ def _with(state: State, cause: Cause, values: Values) -> Fitted:
 
 
 def _simpler(state: State, best: Fitted, trial: Fitted) -> bool:
-    """Whether a trial has fewer parameters than the best one, and is as good as can be told."""
+    """Whether a trial has fewer parameters than the best one, and fits as well, within the doubt."""
     known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))
     return own < known and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
 
 
 def promising(state: State, score: Score) -> bool:
-    """Whether a refit, whose gain is larger, may make it relevant."""
+    """Whether a candidate may become relevant by a refit, whose gain is larger than the score."""
     return score.p_value <= LIMITS.p_max and score.gain > LIMITS.linearised * state.floor.relevant

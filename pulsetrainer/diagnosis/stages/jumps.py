@@ -1,11 +1,14 @@
 """Jumps: the raw data are searched again, now that causes are known.
 
-A hum, too, looks like jumps between flat runs. So a gate that other causes can set off as well is applied
-once more to the output less what the causes found add to it, and its finding is dropped if it no longer
-fires. The other way round, sticking smaller than the noise, or all at one rate, shows only in what the model
-leaves: where that is relevant beside noise from sample to sample, the residual is searched for it (decision
-044). Jumps that are not far larger than coarse steps of the output are those steps. What was taken out of a
-record is not tested again, nor what is left of it: coarse steps that were smoothed still have flat runs.
+Some gates can be set off by other causes: a hum, too, looks like jumps between flat runs. Such a gate is
+applied once more to the output less what the causes found add to it, and its finding is dropped if it no
+longer fires.
+
+The other way round, some sticking shows only in what the model leaves: sticking that is smaller than the
+noise, or that was recorded at one rate only. If more is left there than noise from sample to sample, by a
+relevant amount, the residual is searched for it (decision 044). Jumps that are not far larger than the coarse
+steps of the output are those steps. What was already taken out of a record (`correct`) is not tested again,
+and neither is what remains of it: coarse steps that were smoothed still have flat runs.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
-    """Return the state with firings withdrawn and added."""
+    """Return the state without the gates that no longer fire, and with those that fire on the residual."""
     kept = tuple((k, firing) for k, firing in state.firings if not _explained(state, k, firing))
     state = replace(state, firings=kept)
     floor = state.floor.quick  # jumps are heard as slow noise
@@ -37,19 +40,19 @@ def stage(state: State) -> State:
 
 
 def _order(firing: tuple[int, Firing]) -> int:
-    """Place of a firing among others: coarse steps are told last, all else as it was found."""
+    """Place of a firing among others: coarse steps come last, the rest in the order found."""
     return int(firing[1].cause == "quantisation")
 
 
 def _in_its_unit(firing: Firing, scale: Scale) -> Firing:
-    """A finding in what a model leaves, whose figures are all sizes, in the unit of the record."""
+    """Return a firing on the residual, all of whose figures are sizes, in the unit of the record."""
     factor = scale.of_unit(firing.unit)
     figures = {name: factor * size for name, size in firing.figures.items()}
     return replace(firing, value=factor * firing.value, figures=figures)
 
 
 def _explained(state: State, k: int, firing: Firing) -> bool:
-    """Whether what a gate saw on record ``k`` is what the causes found add."""
+    """Whether what a gate saw on record ``k`` is only what the causes found add to the output."""
     cause, terms = library()[firing.cause], state.current.terms
     if not cause.doubted or not terms:
         return False

@@ -1,10 +1,13 @@
 """Intervals: how sure the parameters are.
 
-The spread of each parameter is the larger of two: of joint refits, linearised, on redrawn noise, and of
-leaving out each tenth of the record in turn. Added to it are the error of the levels, as if a fifth of it
-were aligned with the parameter; a fifth of a sample step, since input and output are not read at the same
-moment; and the estimates by other formulas that are as plausible as the library's. What equal loops show has
-the interval of those loops.
+The spread of each parameter is the larger of two: that of joint refits, linearised, on redrawn noise, and
+that of leaving out each tenth of the record in turn. Three errors are added to it:
+
+- the error of the levels, as if a fifth of it were aligned with the parameter;
+- the effect of a fifth of a sample step, since input and output are not read at the same moment;
+- how far other formulas, as plausible as those of the library, move the estimate.
+
+A cause that equal loops show has the interval of those loops.
 """
 
 from __future__ import annotations

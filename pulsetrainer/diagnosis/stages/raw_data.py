@@ -1,17 +1,18 @@
 """Gates on the raw data.
 
-Before any model is fitted, each record is checked, sample by sample as it was measured, for what no model can
-repair: an output cut off by its range, single wild samples, coarse steps, jumps, a driver that does not
-follow its reference, an input outside the range that was identified. Each gate is in the file of its cause;
-some also get the prediction of the model as given. A gate that fires is a finding, and the samples it names
-are left out of everything that follows. They are filled in, since causes filter the output and wild samples
-must not reach the filters.
+Before any model is fitted, each record is checked for faults that no model can repair, sample by sample as it
+was measured. Such faults of the output are a cut at the end of its range, single wild samples, coarse steps,
+and jumps. Those of the input are a driver that does not follow its reference, and values outside the range
+that was identified. Each check is a *gate*, and is in the file of its cause; some gates also use the
+prediction of the model as given. A gate that fires makes a finding, and the samples that it names are left
+out of everything that follows. Their places are filled in by interpolation: some causes are filters, and wild
+samples must not reach these.
 
-Only then is an input that was read in coarse steps interpolated between them, unless the output moves with
-the steps, which shows that the device saw them. The records are brought to even time steps, and sharp turns
-of the input are moved to where the lines beside them meet. Everything is then put into units of the record
-itself: the range of the input, the span of the output, and a second that follows from how fast the input
-moves. No decision from here on depends on seconds, amperes or newtons.
+Only then is an input that was read in coarse steps interpolated between them. It is not if the output moves
+with the steps, which shows that the device saw them. The records are brought to even time steps, and a sharp
+turn of the input is moved to where the lines on both sides of it meet. Everything is then put into units of
+the record itself: the range of the input, the span of the output, and a second that follows from how fast the
+input moves. No decision from here on depends on seconds, amperes or newtons.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from pulsetrainer.diagnosis.state import Question
 
 @dataclass(frozen=True)
 class Masked:
-    """What the gates leave of the records, in their own units, and which gates fired on which record."""
+    """The records after the gates, in their own units, and which gates fired on which record."""
 
     question: Question
     records: tuple[Record, ...]
@@ -71,7 +72,7 @@ def stage(question: Question) -> Masked:
 
 
 def _said(question: Question, record: Record, stamps: FloatArray | None) -> FloatArray | None:
-    """Return what the model as given says of a record (n,); None where that is open."""
+    """Return what the model as given predicts for a record (n,); None where its memory is not known."""
     if question.given is None or not reaches_an_end(record.input, question.low, question.high):
         return None
     return followed(question.given.model, record, stamps, None)
@@ -88,7 +89,7 @@ def followed(model: Model, record: Record, stamps: FloatArray | None, start: Sta
 
 
 def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
-    """Return a record in which the samples that gates name have no weight and are filled in."""
+    """Return a record in which samples that gates name have no weight, and are interpolated."""
     weight = record.sample_weight.copy()
     for firing in firings:
         if firing.mask is not None:

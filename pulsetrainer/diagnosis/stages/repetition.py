@@ -1,22 +1,28 @@
 """Repetition: a cause goes into the model only if it predicts time that was left out of the fit.
 
-What wanders slowly looks like heat, creep or a step, and alternating blocks only interpolate it. So for each
-cause that belongs to the device, whole stretches, a fifth of the time each, are predicted from the others:
-with the cause the errors must fall by at least half of what they fall by in the fit, and they must not rise
-on any stretch. Nor may they rise on any quarter of the blocks, sorted by rate and predicted from the others:
-a formula that only fits the rates of one record misleads at others. A cause that fails this fits, but does
-not repeat: it is reported in these words, and is not added to the model. Neither is one that is in doubt for
-another reason (`rivals`), nor one that a fault of the measurement, or a gain that wears off, could replace:
-that happened in this record, and will not in the next. What equal loops show was tested separately.
+What wanders slowly looks like heat, creep or a step, and blocks that alternate with the fitted ones only
+interpolate it. So each cause that belongs to the device must *repeat*. Whole stretches, a fifth of the time
+each, are predicted from the others: with the cause the errors must fall by at least half of what they fall by
+in the fit, and they must not rise on any stretch. Nor may they rise on any quarter of the blocks, sorted by
+rate and predicted from the others: a formula that fits only the rates of one record misleads at others.
 
-The cause that repeats least goes first; the others are then refitted without it and tested again, since they
-had been fitted beside it. A cause whose strength may be zero, and that explains less than a tenth or half a
-per cent of the span, was not found: it only improves the formula of another cause, if anything. Nor was a
-slow fault of the measurement that the weights and the causes beside it can absorb almost entirely: it would
-be taken out as large as it was fitted, from a device that never had it. This is reported, since it may be
-there all the same. But if no other cause is slow, and it predicts nearly all that can be lowered on time that
-was left out, it is there. What is left beside one that is not there is refitted without it, and a step is
-tested again for whether it only settles.
+A cause that fails this fits the record, but does not repeat. It is reported in these words, and is not added
+to the model. Neither is a cause that is in doubt for another reason (`rivals`). Nor is one in whose place a
+fault of the measurement, or a gain that wears off, would fit as well: that happened in this record, and will
+not in the next. What equal loops show was tested separately. The cause that repeats least goes first; the
+others, which had been fitted beside it, are then refitted and tested again.
+
+Some causes count as not found at all:
+
+- A cause whose strength may be zero, and that explains less than a tenth of what can be lowered, or less than
+  half a per cent of the span. It only improves the formula of another cause, if anything.
+- A slow fault of the measurement that the weights and the other causes can absorb almost entirely. It would
+  be taken out as large as it was fitted, from a device that never had it. It is reported, since it may be
+  there all the same. It does count as found if no other cause is slow, and it predicts nearly all that can be
+  lowered on time that was left out.
+
+When such a cause is gone, the others are refitted, and a step is tested again: it may be something that only
+settles.
 """
 
 from __future__ import annotations
@@ -64,12 +70,12 @@ def stage(state: State) -> State:
 
 
 def _is_asked(state: State, cause: Cause) -> bool:
-    """Whether a cause must repeat: one of the device that equal loops did not show."""
+    """Whether a cause must repeat: it belongs to the device, and equal loops did not show it."""
     return cause.lasting and cause.id not in state.by_contrast
 
 
 def _without_held(state: State) -> State:
-    """Return the state without slow faults of the measurement that weights and other causes hold."""
+    """Return the state without slow faults of the measurement that weights and other causes absorb."""
     held = [one for one in state.findings if one.found and _is_held(state, one)]
     said = [
         Evidence("held", one.cause.id, figures={"share": min(one.explains_percent, PERCENT)})
@@ -81,7 +87,7 @@ def _without_held(state: State) -> State:
 
 
 def _without_what_is_gone(state: State) -> State:
-    """Return the state with the fit of what was found, asked again: the rest leaves what it took away."""
+    """Return the state refitted with the causes still found; what the others took away is judged again."""
     found = {one.cause.id for one in state.findings if one.found}
     terms = [term for term in state.current.terms if term.cause.id in found]
     if len(terms) == len(state.current.terms):
@@ -100,7 +106,7 @@ def _without_what_is_gone(state: State) -> State:
 
 
 def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
-    """Return a finding with its share where others are gone; what only settles is no step then either."""
+    """Return a finding with its share now that others are gone; a step may then be what only settles."""
     gain = state.without[term.cause.id].squares - state.current.squares
     settles = term.cause.sudden and SETTLES not in finding.doubts and wear.is_as_good(state, term)
     doubts = (*finding.doubts, SETTLES) if settles else finding.doubts
@@ -108,14 +114,14 @@ def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:
-    """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
+    """Whether a strength may be zero, and the effect is small: beside the other causes, or at all."""
     share = finding.explains_percent / PERCENT
     little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
     return MAY_BE_NOTHING in finding.doubts and little
 
 
 def _is_held(state: State, finding: Finding) -> bool:
-    """Whether the rest of the model holds a fault that was found."""
+    """Whether the rest of the model can absorb a fault that was found."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
     if term is None or not may_be_held(term):
         return False
@@ -128,9 +134,9 @@ def may_be_held(term: Term) -> bool:
 
 
 def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> bool:
-    """Whether the rest of the model holds nearly all that such a fault adds.
+    """Whether the rest of the model can absorb nearly all that such a fault adds.
 
-    Not of one that predicts nearly all that can be lowered, and mends no cause that is slow as well.
+    False for a fault that predicts nearly all that can be lowered, if no other slow cause is in the model.
     """
     fall = without.squares - state.current.squares
     mends = any(one.cause.family in SLOW for one in state.current.terms if one is not term)
@@ -139,7 +145,7 @@ def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> b
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
-    """Id of the cause of a fit that repeats least, if not enough."""
+    """Id of the cause of a fit that repeats least, if it does not repeat enough; else an empty set."""
     asked = [one for one in fitted.terms if _is_asked(state, one.cause)]
     shares = {one.cause.id: repeated(state.held_out, fitted.without(one), fitted) for one in asked}
     least = min(shares, key=shares.__getitem__, default="")

@@ -1,9 +1,9 @@
 """Restart: the wrong one of a family may hide a second cause.
 
-If a device has a field lag and a resonance, a delay explains most of both, and what it leaves looks like more
-lag, so that the resonance is never found. If a cause is still significant although its family is in the
-model, the search begins again with that cause in place of the other, and the better of the two results is
-kept (decision 044).
+If a device has a field lag and a resonance, a delay explains most of both. What the delay leaves looks like
+more lag, so that the resonance is never found. So a cause may still be significant although its family is in
+the model. The search then begins again with that cause in place of the other, and the better of the two
+results is kept (decision 044).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pulsetrainer.diagnosis.state import State
 
 
 def stage(state: State) -> State:
-    """Return the better of the search so far and of one that begins with another of a family."""
+    """Return the better of two searches: this one, and one that begins with another cause of a family."""
     scores = state.scores.scores
     left = next((s for s in scores if s.cause.family in state.families and state.significant(s)), None)
     if left is None:

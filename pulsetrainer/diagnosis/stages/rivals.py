@@ -1,29 +1,29 @@
 """Rivals: which causes explain the data as well as the one found.
 
-A name is unique only if no other cause fits as well in its place. The three that score best without it are
-fitted jointly; one that comes as close as two fits of the same data may differ, by noise or by what happens
-between two samples, is named beside it. On a record of one single rate all causes that widen the loop with
-the rate are named together: there they are just a wider loop. Causes that equal loops showed have no rivals
-here: equal loops differ by nothing else that is known.
+A name is unique only if no other cause fits as well in its place. The three causes that score best without it
+are fitted jointly, each in its place. A rival is named beside the cause found if noise, or what happens
+between two samples, could make the difference between the two fits. On a record of one single rate all causes
+that widen the loop with the rate are named together: there they are just a wider loop. Causes that equal
+loops showed have no rivals here: nothing else that is known makes equal loops differ.
 
 What speaks against a cause that was found is written beside it:
 
 - it predicts blocks that were left out worse than the model without it;
 - the interval of its strength spans zero;
-- a parameter, its interval or the strength itself ends where the search did; a cause of the device that does
-  so also where it takes away less than it leaves;
-- it is a hum in step with the input, most of which the weights would hold;
-- it is slow, and what is left still wanders from one tenth of the time to the next;
-- it is slow and of the record, and all causes together take away less than half of what can be lowered on
-  blocks that were left out: a device of another kind leaves as much;
-- it follows the speed, like anything that a device does as it moves: more than the noise from sample to
+- a parameter, its interval or the strength itself ends where the search did; for a cause of the device it is
+  also written if the cause then takes away less than it leaves;
+- it is a hum in step with the input, and the weights would absorb most of it;
+- it is slow, and the residual still wanders from one tenth of the time to the next;
+- it is a slow fault of the measurement, and all causes together take away less than half of what can be
+  lowered on blocks that were left out: in a device of another kind they would do as much;
+- it follows the speed, like anything that a device does as it moves; more than the noise from sample to
   sample is left, and of what the model leaves without it less than three quarters is predicted on blocks left
   out;
 - only equal loops would show it, and there are none;
-- a gain that wears off with time or with the way of the input fits as well, so that it could equally be
-  `accommodation`; of a step: whatever settles from the beginning of the record;
-- the record has one rate and no rest, where any cause looks like what a model lacks of the device, and the
-  cause explains little more than what is left and slow, or that is more than noise.
+- a gain that wears off with time, or with the way of the input, fits as well, so that it could equally be
+  `accommodation`; or, against a step, whatever settles from the beginning of the record fits as well;
+- the record has one rate and no rest, where any cause looks like what a model lacks of the device; and what
+  is left is more than noise, or is slow and hardly smaller than what the cause explains.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _finding(state: State, term: Term) -> Finding:
 
 
 def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
-    """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
+    """Yield what speaks against a cause that was found: it is reported with these words beside it."""
     cause, known = term.cause, state.estimates[term.cause.id]
     yield from _of_its_prediction(state, cause, gain)
     if cause.by_contrast and not _equal_loops(state):
@@ -112,7 +112,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
 
 
 def _of_its_prediction(state: State, cause: Cause, gain: float) -> Iterator[str]:
-    """Yield what parts that were left out say against a cause."""
+    """Yield what the prediction of blocks left out says against a cause."""
     if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
         yield WORSE
     left = state.current.squares
@@ -140,10 +140,10 @@ def squares_added(state: State, term: Term) -> float:
 
 
 def squares_moved(state: State, term: Term) -> float:
-    """Return the same of a slow fault, but for another zero, which no model lacks.
+    """Return the same for a slow fault, without the part that is a mere shift of the zero.
 
-    Of one that is over soon that is most of it. In the measure of a drift that goes on evenly, of whose
-    squares a quarter is left.
+    Every model has a zero of its own. A fault that is over soon is mostly a shift. The result is scaled as
+    for a drift that goes on evenly, of whose squares a quarter is left without the shift.
     """
     added = _added(state, term)
     return min(float(added @ added), LIMITS.even_drift * added.size * float(np.var(added)))
@@ -159,8 +159,8 @@ def _added(state: State, term: Term) -> FloatArray:
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
     """Whether a cause may be what the model lacks of the device, on records of one rate without rests.
 
-    There, and where samples have no time, all that takes time follows the input, as that does: a fall of the
-    squares must be much larger than what is left, and what is left be noise.
+    There, and in samples without time, every effect that takes time follows the input, and so does the error
+    of the model. The fall of the squares must be much larger than what is left, and what is left be noise.
     """
     several = residual.TIME not in state.lacks and not {residual.RATES, residual.HOLDS} <= set(state.lacks)
     if cause.by_contrast or several:
@@ -172,7 +172,7 @@ def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
 
 
 def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
-    """Whether an interval ends where the search did; an end of zero is the cause's own."""
+    """Whether an interval ends where the search did; zero is a natural end, and does not count."""
     return any(
         end != 0 and np.isclose(one, end * state.scale.of_unit(bound.unit), atol=0.0)
         for own, bound in zip(known, bounds, strict=False)
@@ -187,10 +187,10 @@ def _equal_loops(state: State) -> bool:
 
 
 def rivals(state: State, term: Term) -> tuple[str, ...]:
-    """Causes that repair the data as well as ``term``, within the noise of the comparison.
+    """Causes that explain the data as well as ``term``, within the noise of the comparison.
 
-    Lags in another place differ little: one is as good too if it is no farther behind than a share of what is
-    left above the noise from sample to sample, which may be the model's own error.
+    Lags in different places of the chain differ little. One also counts as good if it is behind by no more
+    than a share of what is left above the noise from sample to sample: that may be the model's own error.
     """
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares

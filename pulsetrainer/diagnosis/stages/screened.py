@@ -1,16 +1,17 @@
 """Screening: every cause is scored against noise, and the smallest effect that would have shown is noted.
 
-Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual fall?
-The same is tried on noise that looks like the residual but holds no cause, drawn again and again; of each
-draw the least likely score over the whole library counts. The p-value of a cause is the share of draws with
-one as unlikely, so that it holds for the search as a whole and not for one cause. Causes with p of at most
-0.01 go on to the joint fit.
+Each cause that is not in the model yet is tried at a few values of its parameters, linearised. Its score is
+the fall of the sum of squares of the residual. The same is done with noise that looks like the residual but
+holds no cause, drawn again and again; of each draw only the least likely score in the whole library counts.
+The p-value of a cause is the share of draws with a score that is at least as unlikely as its own. It
+therefore holds for the search as a whole, and not for one cause alone. Causes with p of at most 0.01 go on to
+the joint fit.
 
-From the same null follows how small an effect of each cause would have shown: large enough that the test
-finds it in nine of ten records, that what the weights leave of it is relevant, and that neither is undone by
-what looks like the cause already. For a cause that is in the model by then, the present noise is used. For
-one that the weights can absorb almost entirely no such figure is given: what they leave of it depends only on
-how finely they are drawn.
+From the same draws follows how small an effect of each cause would have shown. Such an effect is large enough
+that the test finds it in nine of ten records, and that what the weights leave of it is relevant. It is so
+even if what looks like the cause already works against it. For a cause that has entered the model since, the
+present noise is used. For a cause that the weights can absorb almost entirely no such figure is given: what
+they leave of it depends only on how fine the levels are.
 """
 
 from __future__ import annotations

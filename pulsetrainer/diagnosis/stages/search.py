@@ -1,7 +1,8 @@
 """Search: one cause after another.
 
-Screening, joint fit and acceptance are repeated, each time from the model with all causes accepted so far
-and with a null drawn anew from it, until no candidate is accepted or there are five causes.
+Screening, joint fit and acceptance are repeated. Each round begins with the model that holds all causes
+accepted so far, and draws its noise anew from what that model leaves. The search ends when no candidate is
+accepted, or when there are five causes.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Settling: what still settles long after the beginning of a record has a cause.
 
-What a device did before a record decays in it, and the search fits the beginning of each record freely. A
-sensor that warms up looks the same, and a free beginning holds nearly all of it. Where no slow cause was
-found, and a model without the free beginning leaves relevantly more after the first fifth of a record, the
-search is made again without it. That counts where it finds what leaves as little as the free beginning does.
+The after-effects of what a device did before a record decay in it, so the search fits the beginning of each
+record freely. A sensor that warms up looks the same, and a free beginning absorbs nearly all of it. So if no
+slow cause was found, the records are also fitted without the free beginning. If that leaves relevantly more
+after the first fifth of a record, the search is made again without it. The new result counts if it leaves as
+little as the old one did.
 """
 
 from __future__ import annotations

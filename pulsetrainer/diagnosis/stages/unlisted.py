@@ -1,21 +1,26 @@
 """Unlisted: what no listed cause explains is sought in a bank of states.
 
 If more than noise is left, the device may depend on something that is not in the list. Its output, or its
-gain, is then fitted by a curve over one state after another: averages of input and output over many times, of
-their squares and speeds, how far each is from its average, the last turn, the distance and the time since,
-and how long the input has rested. The state is taken that best predicts whole stretches of time that were
-left out, if noise alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if the
-effect matters and is more than the formulas of listed causes may miss (8 % of what they explain), and if,
-refitted with all weights, it repeats (`repetition`). The noise is then estimated again beside it, and the
-next state is sought in what is left, up to three. What may be slow noise is searched too; a curve that is
-found there must predict three quarters of all that is left above the noise from sample to sample (decision
-105).
+gain, is then fitted by a curve over one state after another. The bank of states holds averages of input and
+output over many lengths of time, of their squares and of their speeds, and how far each is from its average.
+It also holds the last turn of the input, the distance and the time since that turn, and how long the input
+has rested.
 
-If the listed causes found leave more than half unexplained, or nothing is found beside them, the search
-begins without them: they may be mistaken. They are then tested again, beside the curve; and every cause,
+The best state is the one that best predicts whole stretches of time that were left out. It is taken if
+
+- noise alone hardly ever predicts as much with any state of the bank (p of at most 0.01);
+- its effect is relevant, and more than the formulas of listed causes may miss (8 % of what they explain);
+- refitted with all weights, it repeats (`repetition`).
+
+The noise is then estimated again beside it, and the next state is sought in what is left, up to three. What
+may be slow noise is searched too. A curve that is found there must predict three quarters of all that is left
+above the noise from sample to sample (decision 105).
+
+If the listed causes found leave more than half unexplained, or if nothing is found beside them, the bank is
+searched without them: they may be mistaken. They are then tested again beside the curve, and every cause,
 listed or not, must make the fit worse when it is taken out. But a curve that only replaces listed causes
 which explain nearly as much is a better formula for them, and not a dependence of its own. The same holds for
-one of several that the listed causes could replace.
+one of several curves that the listed causes could replace.
 """
 
 from __future__ import annotations
@@ -51,9 +56,9 @@ def stage(state: State) -> State:
 
 
 def _levels_are_most(state: State) -> bool:
-    """Whether most of what is left would be the error of the levels, and it matters.
+    """Whether the error of the levels would be most of what is left, and what is left matters.
 
-    What is missing makes that estimate too large: it may be what the finer levels imitate.
+    A missing cause makes that estimate too large: the finer levels may imitate it.
     """
     of_levels = state.floor.count * state.floor.discretisation**2 > LIMITS.half * state.current.squares
     return of_levels and state.current.rms > LIMITS.matters * state.floor.span
@@ -75,7 +80,7 @@ def _sought(state: State) -> State:
 
 
 def _compared(state: State, begun: State, found: Fitted, p_value: float) -> State:
-    """Return the state with dependences ``found`` from ``begun``; as it was where listed ones do as well."""
+    """Return the state with the dependences ``found``, or as it was if listed causes do as well."""
     if state.current.squares <= found.squares:
         return state
     after = _heard_again(replace(begun, current=found, p_values={**begun.p_values, _ID: p_value}))
@@ -92,7 +97,7 @@ def _compared(state: State, begun: State, found: Fitted, p_value: float) -> Stat
 
 
 def _with_names(state: State, after: State, listed: list[Term]) -> State:
-    """Return the model ``after`` with listed causes in the place of one curve, where they fit as well."""
+    """Return the model ``after`` with listed causes in the place of one curve, if they fit as well."""
     learned = next((term for term in after.current.terms if term.cause.id == _ID), None)
     if learned is None or not isinstance(learned.cause, Unlisted) or len(learned.cause.parts) == 1:
         return after
@@ -113,9 +118,9 @@ def _with_names(state: State, after: State, listed: list[Term]) -> State:
 def _predicts(state: State, found: Fitted) -> bool:
     """Whether learned dependences predict most of what can be lowered on blocks that were left out.
 
-    The loops of a device that is no Preisach operator look like a dependence on the last turn, but by halves.
-    What may all be slow noise must be predicted down to the noise from sample to sample. A pinched loop,
-    which curves describe by halves as well, must be explained down to it.
+    The loops of a device that is no Preisach operator look partly like a dependence on the last turn. What
+    may all be slow noise must be predicted down to the noise from sample to sample. A pinched loop, which
+    curves describe partly too, must be explained down to the same noise.
     """
     if state.pinched_at is not None and not state.butterfly:
         return not _is_above(replace(state, current=found), state.floor.fine)
@@ -124,28 +129,28 @@ def _predicts(state: State, found: Fitted) -> bool:
 
 
 def _wanders(begun: State, found: Fitted) -> bool:
-    """Whether a zero that follows the time alone explains nearly as much as learned dependences.
+    """Whether a zero that depends on time alone explains nearly as much as the learned dependences.
 
-    Reversal curves go through their turns once, in the order of the time: a state follows it there.
+    Reversal curves pass their turns once, in the order of time, so that a state follows the time there.
     """
     fall = begun.current.squares - found.squares
     return of_a_wandering_zero(begun.current, begun.held_out, Unlisted.order) > LIMITS.nearly_all * fall
 
 
 def _is_above(state: State, floor: Floor) -> bool:
-    """Whether what is left is more than a floor, by what is relevant."""
+    """Whether what is left is relevantly more than a floor."""
     return state.current.squares - floor.squares > floor.relevant
 
 
 def _more_is_left(state: State) -> bool:
-    """Tell whether more is left than noise, or much that is slow: that may be either, and this finds out."""
+    """Whether more than noise is left, or much that is slow and may be noise or not: the bank decides."""
     left, quick = state.current.squares, state.floor.quick
     slow = left - quick.squares > LIMITS.slow_share * left
     return _is_above(state, state.floor_left) or (slow and _is_above(state, quick))
 
 
 def _learned(state: State) -> tuple[Fitted | None, float, bool]:
-    """Return the model with the dependences that repeat, its p-value, and whether one did not."""
+    """Return the model with the dependences that repeat, its p-value, and whether one did not repeat."""
     listed = LIMITS.imperfect * (state.baseline.squares - state.current.squares)
     largest = 0.0
     parts: list[Part] = []
@@ -188,7 +193,7 @@ def _cancel(parts: list[Part], values: list[float]) -> bool:
 
 
 def _heard_again(state: State) -> State:
-    """Return the state with the noise under its model: what was heard before holds the dependence."""
+    """Return the state with its noise estimated again: the old estimate contained the dependence."""
     return replace(state, floor=state.floor.heard(state.current).at(state.coarse, state.current))
 
 

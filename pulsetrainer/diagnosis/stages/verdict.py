@@ -1,15 +1,25 @@
 """Verdict: the strongest cause, or that it is unknown.
 
-If more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause that
-a gate saw, since no refit takes away what it leaves; without such a cause it is `unknown`, whatever else was
-found. Otherwise the verdict is the cause that explains most, then what a gate on the raw data saw; the gate
-comes first if all others together are below half a per cent of the span. Where nothing was found it is
-`none`, or `inconclusive` if the record could not have shown half a per cent of the span of a common cause. A
-hum no larger than the noise is found and reported, but is not a verdict; nor are steps that noise averages
-out, a drift or step no larger than slow noise, or what may be one, or a cause that is in doubt (`rivals`,
-`repetition`). If all branches of a loop pass through one point within it, as those of a memristor do,
-anything left beyond the noise from sample to sample is `unknown`: no Preisach operator has such a loop, and
-any cause explains some of it.
+A cause is *jagged* if it leaves what no refit can take away, such as sticking or coarse steps. Much is
+*unexplained* if more than half of what can be lowered is left, and if that is relevant several times over and
+more than 0.2 % of the span. The verdict is the first of these that applies:
+
+- If much is unexplained: the jagged cause that a gate saw, or without one `unknown`, whatever else was found.
+- The cause that explains most, and after it what a gate on the raw data saw. The gate comes first if all
+  other causes together explain less than half a per cent of the span.
+- If there is neither: `inconclusive`, if the record could not have shown half a per cent of the span of a
+  common cause; otherwise `none`.
+
+Some findings are reported, but never become the verdict:
+
+- a hum no larger than the noise;
+- steps that noise averages out;
+- a drift or step no larger than slow noise, or a cause that may be such a one;
+- a cause that is in doubt (`rivals`, `repetition`).
+
+All branches of a loop may pass through one point within it, as those of a memristor do. No Preisach operator
+has such a loop, and any cause explains some of it. Anything left beyond the noise from sample to sample is
+then `unknown`.
 """
 
 from __future__ import annotations
