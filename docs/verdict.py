@@ -28,9 +28,22 @@ VERDICT = """\
 
 {mark}
 
-`diagnose` asks one question after another. Each stage below is a file of `pulsetrainer/diagnosis/stages`, and what it says here
-is what stands at its top; the list itself is `pulsetrainer/diagnosis/procedure.py`. Every number that decides is in one of
-the tables at the end, with what it guards. How often the verdict is right is told by [blind.md](blind.md).
+`diagnose` asks one question after another. Each stage below is a file in `pulsetrainer/diagnosis/stages`, and its text here
+stands at the top of that file; the list of the stages is `pulsetrainer/diagnosis/procedure.py`. Every number that decides is in
+one of the tables at the end, with what it guards. How often the verdict is right is in [blind.md](blind.md).
+
+Beside those of the [vocabulary](vocabulary.md) these words are used throughout:
+
+- **left out**: not used in a fit, but predicted by it. *Blocks* are left out in two alternating halves; *pieces*, or stretches,
+  are each a fifth of the time.
+- **reducible part**: what can be lowered (stage 2). The held-out error has such a part as well.
+- **noise from sample to sample**, or *quick* noise: what the differences of neighbouring samples show. Slower noise may also be
+  an error of the model.
+- **null**: noise like that of the record, drawn again and again, in which there is no cause.
+- **linearised**: fitted as if the output changed in proportion to a parameter.
+- **free beginning**: a few decays that are fitted to the beginning of each record, for what the device did before it.
+- **device of another kind**: one that is no Preisach operator. Some were simulated to set the numbers.
+- **decision**: a page in [decisions](decisions/README.md) that says why.
 """
 METHODS = (screening, fitting, held_out, congruency, intervals)
 # name = value  # what it guards

@@ -27,7 +27,7 @@ def library() -> dict[str, Cause]:
 
 
 def other_kinds(cause: Cause, frame: Frame) -> list[Cause]:
-    """Return the other kinds of a cause that have as many parameters: a finer formula begins elsewhere."""
+    """Return the other kinds of a cause with as many parameters; a finer formula is tried elsewhere."""
     known = library()[cause.id].kinds() if cause.id in library() else ()
     count = len(cause.quantities(frame))
     return [one for one in known if one is not cause and len(one.quantities(frame)) == count]
@@ -47,13 +47,13 @@ def cause_named(name: str) -> Cause:
 
 
 def taken_out(corrected: Iterable[str]) -> set[str]:
-    """Return the ids of causes that were taken out of a record, and of those that what is left looks like."""
+    """Return the ids of causes taken out of a record, and of those that their remains look like."""
     known = [library()[one] for one in corrected if one in library()]  # a later version may know more
     return {name for one in known for name in (one.id, *one.leaves)}
 
 
 def upright_values(one: Found | Extension, polarity: int) -> Values:
-    """Return the values that were kept of a cause, for the output times the polarity.
+    """Return the stored values of a cause, for the output times the polarity.
 
     DataError as ``cause_named``.
     """

@@ -11,7 +11,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, r
 
 _TRIED = 0.05  # amplitude
 _TRIED_PATHS = (7.0, 20.0, 60.0)  # ranges of the input: some loops, dozens, a whole record
-_STRETCH = 200.0  # decay lengths in one sum: exp stays a number
+_STRETCH = 200.0  # decay lengths in one sum: more would overflow exp
 
 
 class Accommodation(Cause):

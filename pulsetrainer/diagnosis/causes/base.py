@@ -3,8 +3,8 @@
 The extended model is a chain: the measured input passes the causes of stage ``input`` in their order, then
 the Preisach operator, then the causes of stage ``output``. A cause of stage ``record`` is found on the raw
 data by its own ``gate`` and changes no model. The file holds all that is the cause's own: formula, start
-values, gate, thresholds, flags and words. Only where causes are weighed against one another, or a step treats
-one by itself, does other code name it.
+values, gate, thresholds, flags and words. Other code names a cause only where causes are compared, or where
+a step treats that cause in its own way.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
-_LEVELS = 48  # of a hysteresis that tells what the readings leave open
+_LEVELS = 48  # of a hysteresis that fills in what the readings leave open
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
@@ -100,7 +100,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Taken:
-    """A record whose faults of measurement are undone, in its own units, of polarity 1."""
+    """A record whose faults of measurement are to be undone, in its own units, of polarity 1."""
 
     raw: Raw  # as it was measured
     time_s: FloatArray  # (n,) as causes count it
@@ -283,7 +283,7 @@ class OfTheRecord(Cause):
 
 
 class OfKinds(Cause):
-    """A cause whose formula leaves a number open: each of a few is tried, as a kind of its own."""
+    """A cause whose formula leaves one number open: a few values are tried, each as a kind of its own."""
 
     tried: ClassVar[tuple[float, ...]]  # the first is meant where a model keeps none
 
@@ -322,7 +322,7 @@ def spread(low: float, high: float, ratio: float) -> list[float]:
 
 
 def remembered(past: Past | None, name: str, at_first: FloatArray) -> FloatArray:
-    """Return what was kept under a name of the piece before; ``at_first`` where there was none."""
+    """Return what the piece before kept under a name; ``at_first`` where there was none."""
     return at_first if past is None else past.before.get(name, at_first)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
-_TRIED = (1e-5, 1e-4)  # a good crystal's, a bad one's
-_SLIP = 1.0  # time steps over the longest record: half of it, its mean, is what moments of sampling do
+_TRIED = (1e-5, 1e-4)  # the errors of a good and of a bad crystal
+_SLIP = 1.0  # time steps over the longest record: its mean, half a step, may be due to moments of sampling
 
 
 class ClockSkew(Cause):

@@ -3,9 +3,9 @@
 y0 is the output of empty memory.
 
 The records may also differ from the model as given. The search for causes refits the weights, so it finds
-nothing wrong with a record that a Preisach model of its own describes well. Where the model as given is far
-off and the refitted one is not, that is the finding: load, configuration or zero have changed. How, is told
-by the gain and the offset that carry the given prediction over, y = (1 + g) M(u) + b.
+nothing wrong with a record that a Preisach model of its own describes well. If the model as given is far off
+and the refitted one is not, that is the finding: load, configuration or zero have changed. The gain and the
+offset that bring the given prediction to the record say how: y = (1 + g) M(u) + b.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 _TRIED = 0.003  # of the span, and of the gain
 # Against the model as given
 _FAR = 0.01  # of the output's span: a model nearer than this is not in question
-_REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less, left out blocks too
-_ALL_BUT = 0.001  # of the squared error: beside such a change nothing that is left over matters
-_GAIN = 2.0 * _FAR  # about the middle of the output, this gain alone would put the model in question
-_OF_SHIFT = 0.5  # a shape that moved more than this share of the shift has changed as well
+_REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less, on blocks left out too
+_ALL_BUT = 0.001  # of the squared error: if a change leaves less, what it leaves does not count
+_GAIN = 2.0 * _FAR  # a gain of this size, about the middle of the output, makes a model far off
+_OF_SHIFT = 0.5  # of the shift: a shape that differs by more has changed as well
 _BLOCKS = 10  # of the jackknife: neighbouring samples are not independent
 
 
@@ -108,17 +108,17 @@ class Change:
 
 
 def left_by(measured: FloatArray, predicted: FloatArray | float, noise_rms: float) -> float:
-    """Rms error of a prediction (n,) or () without the white noise of single samples, output unit."""
+    """Rms error of a prediction (n,) or (), less the white noise of single samples, output unit."""
     return float(np.sqrt(max(float(np.mean((measured - predicted) ** 2)) - noise_rms**2, 0.0)))
 
 
 def is_near(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> bool:
-    """Whether a prediction (n,) leaves less than 1 % of the span, the white noise of single samples apart."""
+    """Whether a prediction (n,) leaves less than 1 % of the span, apart from the white noise of samples."""
     return bool(left_by(measured, predicted, noise_rms) < _FAR * np.ptp(measured))
 
 
 def follows(refitted_rms: float, given_rms: float) -> bool:
-    """Whether refitted weights leave so much less than those given that these are the trouble."""
+    """Whether refitted weights leave so much less than the given ones that the given ones are at fault."""
     return refitted_rms <= _REFITTED * given_rms
 
 
@@ -170,7 +170,7 @@ def _carried_over(
 
 
 def carried(measured: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Gain and offset (2,) that carry the prediction over to the measurement."""
+    """Gain and offset (2,) that bring the prediction to the measurement."""
     middle = float(predicted.mean())
     about = predicted - middle
     squares = float(about @ about)

@@ -1,7 +1,7 @@
 """the output creeps on under a constant input: a low-pass, or a bank of three or five.
 
-One time constant is that of a single process, such as air that passes a gap; three or five stand for the many
-of a solid, over one decade of time or over two. All kinds are tried.
+One time constant stands for a single process, such as air that passes a gap. Three or five stand for the many
+time constants of a solid, over one decade of time or over two. All kinds are tried.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values,
 
 _TRIED = 0.03  # amplitude
 _FASTEST_S = 0.1  # the fastest middle time constant
-_SLOWEST = 1.0 / 30.0  # of the record: the slowest one ...
-_SHORT = (3.0, 1.0 / 6.0)  # s, or of the record: ... but in a short one as slow as these
-_RATIO = 10**0.5  # from one to the next
-_BOUND = 0.2  # of the record
+_SLOWEST = 1.0 / 30.0  # of the record: the slowest middle time constant ...
+_SHORT = (3.0, 1.0 / 6.0)  # ... but up to these in a short record: in s, and as a share of the record
+_RATIO = 10**0.5  # from one time constant tried to the next
+_BOUND = 0.2  # of the record: the slowest time constant that a refit reaches
 _RATIOS = (0.25, 4.0)  # of the outer time constants of three to the middle one
 _DECADES = (0.1, 10**-0.5, 10**0.5, 10.0)  # of the outer ones of five
 _EQUAL = 1.0 / 3.0  # share of the middle time constant of three ...
@@ -31,7 +31,7 @@ _NEARLY = 0.75  # ... and one that is as plausible
 
 
 class Creep(OfKinds):
-    """Slow relaxation, as a low-pass or as some on a logarithmic grid of time constants."""
+    """Slow relaxation: one low-pass, or several on a logarithmic grid of time constants."""
 
     id = "creep"
     title = "the {output} creeps on under a constant {input}"

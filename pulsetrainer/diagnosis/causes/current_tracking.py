@@ -10,8 +10,8 @@ import numpy as np
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
-_SHARE = 0.02  # of the input's range: a driver that errs less does its work
-_WORST = 0.99  # quantile of the error: what lasts less than a hundredth of the record is a turn
+_SHARE = 0.02  # of the input's range: a driver with a smaller error is good enough
+_WORST = 0.99  # quantile of the error: an error shorter than a hundredth of the record belongs to turns
 
 
 class CurrentTracking(OfTheRecord):

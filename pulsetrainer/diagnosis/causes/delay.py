@@ -1,7 +1,8 @@
 """the output is late by a fixed time: P[u(t - d)].
 
-The operator does not know time, so P[u(t - d)] is its output shifted by d. Shifting the output is the better
-of the two: an input interpolated between samples loses the tips of its loops, which the memory keeps long.
+The operator does not know time, so P[u(t - d)] is its output shifted by d. To shift the output is better than
+to shift the input: an input interpolated between samples loses the tips of its loops, and the memory keeps
+that error for long.
 """
 
 from __future__ import annotations

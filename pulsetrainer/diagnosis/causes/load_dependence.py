@@ -1,7 +1,8 @@
 """the output feeds back into the input: P[u + k y].
 
-The static weights live on the range of the input; u + k y has a wider one. Any straight scale of the seen
-input is the weights' own, so it is brought back to the range of u: with y- and y+ the output at its ends,
+The static weights are defined on the range of the input u, but u + k y has a wider range. The weights can
+absorb any linear scale of their input, so u + k y is brought back to the range of u. With y- and y+ the
+output at the ends of that range,
 
     v = low + (u - low + k (y - y-)) / (1 + k (y+ - y-) / (high - low)).
 """
@@ -14,7 +15,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 _TRIED = 0.01  # of the range over the span
-_LEAST = 0.2  # of the range: a feedback that takes more of it away is none
+_LEAST = 0.2  # of the range: a feedback that leaves less of it is not allowed
 
 
 class LoadDependence(Cause):

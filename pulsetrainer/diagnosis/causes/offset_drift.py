@@ -1,12 +1,13 @@
-"""the zero drifts slowly with time: y + b t, bent, and the more at one end where it relaxes.
+"""the zero drifts slowly with time: y + b t, with a bend, which is stronger at one end if it relaxes.
 
-Drifts slow down as a device warms up, or grow, and most of that happens near one end. What the bend adds is
-zero at both ends of a record (0 to T), so that the rate is that from end to end. Where the drift falls by 1/e
-in 1/k, the bend is that of an exponential, and the same in the middle. That is put in only where noise cannot
-make the difference (`stages.exchange`): a slowing that is not there would move the zero.
+Drifts slow down as a device warms up, or grow, and most of that happens near one end of the record. What the
+bend adds is zero at both ends of a record (0 to T), so the rate is the mean rate from end to end. If the
+drift falls by 1/e in the time 1/k, the bend is that of an exponential, with the same size in the middle. This
+finer formula is used only where noise cannot make the difference (`stages.exchange`): a slowing that is not
+there would move the zero.
 
-The search for causes refits the weights, which hold much of a drift that is over soon; no record tells it
-from another zero then. The model as given does (`given_drift`).
+The search for causes refits the weights, which absorb much of a drift that is over soon. No record can then
+distinguish it from another zero, but the model as given can (`given_drift`).
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ _TRIED = 0.01  # of the span over the record
 _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
 _PLAIN = 2  # parameters of a drift that does not relax ...
 _RELAXING = 3  # ... and of one that does
-_SLOWING = (-3.0, 3.0, 15.0)  # times it falls by 1/e in a record, tried first: it grows, or relaxes
-_EARLY = (5.0, 15.0, 50.0)  # the same where it is searched for: slower ones a parabola finds
-_STRAIGHT = 1e-6  # times: falls less than a double can tell from a parabola
+_SLOWING = (-3.0, 3.0, 15.0)  # falls by 1/e in a record that are tried first; a negative one grows
+_EARLY = (5.0, 15.0, 50.0)  # the same, where an early drift is searched for: a parabola finds the slower ones
+_STRAIGHT = 1e-6  # falls by 1/e in a record: with fewer a double cannot tell it from a parabola
 
 
 class OffsetDrift(Cause):
@@ -72,7 +73,7 @@ class OffsetDrift(Cause):
         self.relaxing = OffsetDrift(_RELAXING) if count == _PLAIN else self
 
     def kinds(self) -> tuple[Cause, ...]:
-        """One that relaxes early is nothing like a parabola: other causes are."""
+        """A drift that relaxes early does not look like a parabola; other causes would be found instead."""
         return (self,) if self.relaxing is self else (self, self.relaxing)
 
     def coarser(self) -> Cause | None:

@@ -10,8 +10,8 @@ import numpy as np
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw
 
-_SLACK = 0.01  # of the range: a noisy input goes that far beyond its end
-_LEFT_OVER = 0.25  # of the samples with weight: a mask that leaves less takes too much
+_SLACK = 0.01  # of the range: noise may carry an input this far beyond the end
+_LEFT_OVER = 0.25  # of the samples with weight: a mask must leave at least this share
 
 
 class OutOfRange(OfTheRecord):
@@ -19,8 +19,8 @@ class OutOfRange(OfTheRecord):
 
     id = "out-of-range"
     title = "the {input} leaves the identified range"
-    formula = "u outside the levels"
-    signature = "samples beyond the model's first or last level"
+    formula = "u outside the range of the model"
+    signature = "samples beyond the model's first or last edge"
     excitation = "any"
     order = 5
     family = "out-of-range"

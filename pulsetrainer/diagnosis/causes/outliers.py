@@ -16,19 +16,19 @@ from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import TINY
 
 _SIGMAS = 8.0  # of Gaussian noise one sample in 10^15 is farther out
-_DIFFERENCE = 2.0**0.5  # a sample less a neighbour has that much more noise
+_DIFFERENCE = 2.0**0.5  # the difference of two neighbours has this many times the noise of one
 _AROUND = 7  # samples of the median
 _FAST = 80.0  # percentile of the steps near by, which three wild samples do not reach
-_NEAR = 31  # samples that are near by
-_TIP = 4.0  # of those steps: a tip at full speed stands out from its median by up to three
-_STEPS = 2.0  # converter steps: nearer is its rounding
+_NEAR = 31  # samples that count as near by
+_TIP = 4.0  # times those steps: a tip at full speed stands out from its median by up to three
+_STEPS = 2.0  # converter steps: a smaller distance is rounding
 _LINE = 5  # samples on one side of a suspect that may explain it
-_TAIL = 0.5  # of them between half the limit and the limit: more are the tail of the noise
+_TAIL = 0.5  # of the samples beyond a limit: if more lie from half of it on, all are a tail of the noise
 _HIGHER = 1.25  # factor from one limit to the next that is tried
 _BACK = 0.1  # of the range: an input that comes back so far within these samples has turned fast
-_STEEP = 4.0  # spans a range: the output of a steep branch, when the input comes back less far
-_ALONE = 3  # samples of a median that takes away a single wild one
-_LEAST = 3  # wild samples: fewer are no fault of a device
+_STEEP = 4.0  # spans per range: slope of a steep branch, for an input that comes back less far
+_ALONE = 3  # samples of a median that removes a single wild one
+_LEAST = 3  # wild samples: fewer are not reported as a fault
 
 
 class Outliers(OfTheRecord):

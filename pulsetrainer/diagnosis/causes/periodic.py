@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from pulsetrainer.diagnosis.floor import Floor
 
 _SLOWEST_Hz = 0.4  # slower lines are drift ...
-_PERIODS = 8.0  # ... as are lines of which the record holds fewer periods
-_LINES = 61  # lines of the spectrum whose median is what surrounds a line
+_PERIODS = 8.0  # ... and so are lines with fewer periods in the record
+_LINES = 61  # lines of the spectrum: a line is compared with the median of these
 _FLOOR = 1e-12  # of the highest line: keeps the ratio finite where the spectrum is empty
 _LEAST = 0.02  # of the highest line: lower ones are noise, however far above their surroundings
 _FINER = 41  # frequencies tried between the two neighbours of a line
 _TRIED = 0.003  # of the span
 _FAINT_NOISE = 1.5  # times the noise of single samples, rms: a smaller hum is part of the noise ...
 _FAINT = 0.005  # ... if it is no larger than this share of the span
-_ONE_LINE = 0.9  # of the power of an input of one frequency: loops of any shape and envelope have 0.97 ...
-_WIDE = 2  # ... in the highest line and so many on each side
-_INDEPENDENT = 0.51  # of the samples: so many frequencies are independent (sqrt(pi/3) / 2)
+_ONE_LINE = 0.9  # of the power of the input: one of a single frequency has 0.97, whatever its shape ...
+_WIDE = 2  # ... in the highest line and this many on each side
+_INDEPENDENT = 0.51  # of the number of samples: the number of independent frequencies (sqrt(pi/3) / 2)
 
 
 class Periodic(Cause):

@@ -16,9 +16,9 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.floor import Floor
 
-_COARSE = 0.004  # of the span: finer steps hurt no fit
-_USED = 2  # times that each value comes, on average: in a short record all may differ, far apart as they are
-_MOST = (0.05, 0.95)  # quantiles of the steps: twice their spread is that of the step
+_COARSE = 0.004  # of the span: finer steps harm no fit
+_USED = 2  # times that each value occurs, on average: in a short record all values may differ without steps
+_MOST = (0.05, 0.95)  # quantiles of the steps between values: half their difference is the spread
 
 
 class Quantisation(OfTheRecord):

@@ -10,7 +10,7 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
-_TRIED = (0.005, 0.015)  # of the root of the range
+_TRIED = (0.005, 0.015)  # of the root of the range: coefficients tried
 _NONE = 3e-8  # of the root of range and time step: a smaller coefficient widens nothing
 
 

@@ -12,12 +12,12 @@ from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
-_TRIED_Hz = (3.0, 80.0, 20)  # from, to, how many
-_TRIED_DAMPING = (0.07, 0.25)  # rings long, rings short
+_TRIED_Hz = (3.0, 80.0, 20)  # frequencies: from, to, how many
+_TRIED_DAMPING = (0.07, 0.25)  # one that rings for long, and one that rings shortly
 _FASTEST = 0.2  # of the sample rate: faster ringing is not sampled
-_KEPT = 128  # filters: the grid above and those of some fits
+_KEPT = 128  # filters kept in memory: the grid above and those of some fits
 _TURN = 0.02  # of the range: smaller turns of the input are noise
-_PERIODS = 3.0  # between two turns, where they are farthest apart: with less nothing is seen to ring
+_PERIODS = 3.0  # that fit between the two turns farthest apart: with fewer no ringing can be seen
 
 
 class Resonance(Cause):

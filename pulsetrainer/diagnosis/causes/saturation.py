@@ -1,9 +1,9 @@
 """the output is clipped at the end of its range: found on the raw data.
 
-A rail behind the converter's noise repeats one value exactly. Where there is hardly any noise a flat top
-does so too, and it is a rail if the output stops at once on its way and stays while the input goes on and
-back. One in front of the noise is a level at which the output stays, within its noise, while the model as
-given says that it goes on.
+A *rail* is the value at which the output is clipped. If noise enters before the clipping, one value is
+repeated exactly. Where there is hardly any noise a flat top repeats its value too. It is a rail if the output
+stops at once on its way, and stays while the input goes on and comes back. If noise enters after the
+clipping, the output stays at one level within its noise, while the model as given says that it goes on.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing
 from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
-_PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
+_PILE = 1.2  # times the samples just inside: at its end, noise makes a tail, a rail makes a pile
 _TOWERS = 4.0  # times any single value just inside: the turn of a smooth signal reaches 2.4
-_AT = 0.5  # converter steps: nearer than that is at the rail
-_ENTERING = 30  # samples before and after the rail whose noise tells whether it would have moved the others
+_AT = 0.5  # converter steps: a nearer sample is at the rail
+_ENTERING = 30  # samples before and after the rail: is their noise large enough to move those at it?
 _INSIDE = 10.5  # converter steps beside the rail that are compared with it ...
 _INSIDE_SPAN = 0.02  # ... but no more than this share of the span
-_NOISY = 0.7  # converter steps of noise: with less a flat top repeats itself; steps alone look like 0.66
-_BESIDE = 3  # samples beside a cut off one, in time: only those with low noise are left there
+_NOISY = 0.7  # converter steps: with less noise a flat top repeats itself; steps alone look like 0.66
+_BESIDE = 3  # samples on each side of a clipped one, left out too: those not clipped have low noise
 _AROUND = 9  # samples whose mean is near the rail where ...
 _NEAR = 3.0  # ... it is nearer than this many times the noise
 # A rail where there is hardly any noise
-_TRAVEL = 0.01  # of the range: so far must the input go on while the output stays ...
-_BACK = 0.25  # ... and this share of it back: where a sliding friction turns, its force falls at once
-_BEFORE = 0.25  # of that travel, just before the output stops: by its slope there the output would go on ...
-_STEPS = 10.0  # ... by so many steps of the output: one that saturates slows down first
+_TRAVEL = 0.01  # of the range: the input must go on by this much while the output stays ...
+_BACK = 0.25  # ... and come back by this share of it: at a turn, sliding friction falls at once
+_BEFORE = 0.25  # of that travel, just before the output stops: with its slope there it would go on ...
+_STEPS = 10.0  # ... by this many steps of the output: a device that saturates slows down first
 # A rail in front of the noise, against what the model as given says
-_BEYOND = 0.01  # of the span: so far beyond the rail must the model go ...
-_BEYOND_NOISE = 10.0  # ... and so many times the noise
+_BEYOND = 0.01  # of the span: the model must go this far beyond the rail ...
+_BEYOND_NOISE = 10.0  # ... and this many times the noise
 _FLAT = 1.3  # times the noise: an output that varies more is not held ...
 _FOLLOWS = 0.1  # ... nor is one that follows the model by more than this share
-_BELOW = 0.5  # of the model's error on the whole record: below the rail it must be nearer
+_BELOW = 0.5  # of the model's error on the whole record: below the rail its error must be smaller
 
 
 class Saturation(OfTheRecord):

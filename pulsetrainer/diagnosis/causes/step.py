@@ -11,13 +11,13 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = 0.003  # of the span, and of the gain
-_MOMENTS = (0.05, 0.95, 25)  # of the record, from, to, how many: a side with less holds no loops to compare
-_LOOP = 1.5  # ranges of path on either side: the first stroke of a device that was never cycled is no step
-_SIDE = 0.25  # of all its path: no side needs more
-_BESIDE = 1.5  # distances of two moments on either side: a refit cannot move far, so it must begin near
-_SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
-_EDGE = 20  # of a window: splits within one such part of its ends are left out
-_LEAST = 4  # such parts: a shorter window is split at its begin
+_MOMENTS = (0.05, 0.95, 25)  # of the record: from, to, how many; nearer to an end no loops can be compared
+_LOOP = 1.5  # ranges of path on either side: otherwise a first stroke would look like a step
+_SIDE = 0.25  # of the whole path: neither side needs more than this
+_BESIDE = 1.5  # distances between moments, on either side: a refit must begin near, as it moves little
+_SHARED = 20.0  # samples that the change is spread over, so that the error varies smoothly with its time
+_EDGE = 20  # parts of a window: splits in its first and last part are not tried
+_LEAST = 4  # times such a part: a shorter window is split at its beginning
 
 
 class Step(Cause):

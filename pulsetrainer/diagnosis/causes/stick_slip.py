@@ -1,14 +1,14 @@
 """the output sticks, then jumps: found on the raw data, or in what a fit leaves.
 
-Where the output is stuck follows from the exact moment of the last jump, so that no model of the jumps can
-be fitted sample by sample; what repeats is their size F. Large jumps are seen one by one. Small ones are
-not, but while the output sticks, the residual falls as fast as the model's output M rises, and at the end it
-jumps by F. So over M the residual of a stroke is periodic with period F and has the fundamental F/pi of a
-sawtooth, whatever the rate. Its phase is another one in every stroke: the powers are added,
+The value at which the output sticks follows from the exact moment of the last jump, so no model of the jumps
+can be fitted sample by sample. What repeats is their size F. Large jumps are seen one by one. Small ones are
+not; but while the output sticks, the residual falls as fast as the model's output M rises, and at the end it
+jumps by F. As a function of M, the residual of a stroke is therefore a sawtooth with period F and fundamental
+F/pi, whatever the rate. Its phase differs from stroke to stroke, so the powers are added:
 
-    P(F) = sum over strokes |sum r exp(-2 pi i M / F)|^2 / n,
+    P(F) = sum over strokes |sum r exp(-2 pi i M / F)|^2 / n.
 
-which of white noise is sigma^2 times a gamma variable of as many degrees as there are strokes (Scargle,
+For white noise this is sigma^2 times a gamma variable with as many degrees as there are strokes (Scargle,
 Astrophysical Journal 263, 1982). Errors of the levels are periodic too, but far smaller than their period.
 """
 
@@ -33,35 +33,35 @@ if TYPE_CHECKING:
     from pulsetrainer.diagnosis.fitting import Fitted
 
 # Jumps one by one
-_WIDE_S = 0.006  # of the two means whose difference is a jump
-_WIDE_LEAST = 3  # samples of each
+_WIDE_S = 0.006  # width of each of the two means whose difference is a jump
+_WIDE_LEAST = 3  # samples in each mean, at least
 _SHORTEST = 20  # times that width: a shorter record shows no jumps
 _RATE = 5  # times that width, over which the rate of the input is averaged
 _APART = 6  # times that width, before and after: where the rate changes, other causes make jumps too
 _RATES = (0.1, 3.0)  # ranges a second: slow motion, where sticking shows
 _EVEN = 0.2  # of the rate: a larger change of it is a turn
-_SIGMAS = 7.0  # of the difference of two means
-_AROUND = 15  # such differences in the median: a smooth branch has equal ones, a stuck one none between jumps
+_SIGMAS = 7.0  # of the noise of the difference of two means
+_AROUND = 15  # such differences in a median: equal on a smooth branch, zero between the jumps of a stuck one
 _SHARPER = 4.0  # times that median
-_JUMPS = 15  # fewer are chance
-_LEVELS = 8  # of the output, each with a noise of its own
+_JUMPS = 15  # fewer may be chance
+_LEVELS = 8  # of the output, each with its own noise
 _REST = 0.02  # ranges a second: slower is rest
-_ENOUGH = 40  # times that width: samples that tell the noise of a level
+_ENOUGH = 40  # times that width: samples needed to estimate the noise of a level
 _QUIET = 0.25  # quantile of slow samples: jumps spoil the larger ones
 # Sawtooth of what is left
-_PERIODS = (0.008, 0.08)  # sought, shares of the span: smaller is quantisation, larger is seen one by one
+_PERIODS = (0.008, 0.08)  # sizes sought, of the span: smaller is quantisation, larger is seen jump by jump
 _FINENESS = 0.004  # from one period to the next, relative
-_BINS = 16.0  # of the shortest period: the residual is put in
+_BINS = 16.0  # per shortest period, into which the residual is sorted
 _TURN = 0.02  # of the range: smaller turns of the input are noise
-_STROKE_PERIODS = 3.0  # a stroke must hold
-_SAMPLES = 4.0  # a period must hold
-_STROKE = 5.0  # periods of so many samples: shorter strokes are left out
-_STROKES = 5  # fewer show no period
+_STROKE_PERIODS = 3.0  # in a stroke, at least
+_SAMPLES = 4.0  # in a period, at least
+_STROKE = 5.0  # periods with that many samples: shorter strokes are left out
+_STROKES = 5  # at least; fewer show no period
 _SURE = 8.0  # standard deviations of noise
-_LIKE = (0.2, 1.4)  # fundamental over F/pi: where the model errs by some of F the phase is blurred
-_SHARP = 4.0  # times what periods beside it show: errors of other kinds have no sharp period (decision 044)
-_BESIDE = ((0.8, 0.93), (1.07, 1.25))  # times the period
-_BOTH = 4.0  # squared: an amplitude is twice what one of the two frequencies shows
+_LIKE = (0.2, 1.4)  # fundamental over F/pi, from, to: errors of the model of the order of F blur the phase
+_SHARP = 4.0  # times what neighbouring periods show: other errors have no sharp period (decision 044)
+_BESIDE = ((0.8, 0.93), (1.07, 1.25))  # times the period: the neighbouring ones
+_BOTH = 4.0  # 2 squared: an amplitude is twice what one of its two frequencies shows
 
 Strokes = list[tuple[FloatArray, FloatArray]]  # model's output and residual, each (n,)
 
@@ -178,7 +178,7 @@ def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
 
 
 def _strokes(fitted: Fitted) -> Strokes:
-    """Every stroke of the input without a masked sample in it."""
+    """Return every stroke of the input that has no masked sample in it."""
     problem = fitted.problem
     reach = problem.plane.high - problem.plane.low
     found = []

@@ -1,9 +1,9 @@
 """the output falls with heat: y - k h (y - y0) + b h, tau h' = (u - u0)^2 - h.
 
-Neither u0 nor y0 is the zero of the data, which may lie anywhere. Two kinds are tried: of a device that is
-driven one way, u0 is the lower end of the input's range and y0 the output of empty memory; of one that is
-driven both ways, u0 is the middle of the range and y0 that of the output. That heat moves the zero besides
-(b), or that the gain is about another y0, is put in only where noise cannot make the difference
+Neither u0 nor y0 is the zero of the data, which may lie anywhere. Two kinds are tried. For a device that is
+driven one way, u0 is the lower end of the input's range and y0 the output of empty memory. For one that is
+driven both ways, u0 is the middle of the input's range and y0 the middle of the output's. Heat may also move
+the zero (b), or act about another y0. That is put in only where noise cannot make the difference
 (`stages.exchange`).
 """
 
@@ -18,12 +18,12 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, low_pass, spread
 
 _TRIED = 0.02  # coefficient
-_FASTEST_S = 5.0  # a wire's: what is faster is creep
-_SLOWEST = 0.43  # of the record: what is slower is drift
-_RATIO = 3.0  # from one time constant to the next: a wire's, a coil's, an iron core's
-_BOUNDS = (0.01, 3.2)  # of the record
+_FASTEST_S = 5.0  # that of a wire: anything faster is creep
+_SLOWEST = 0.43  # of the record: anything slower is drift
+_RATIO = 3.0  # from one time constant to the next: those of a wire, a coil, an iron core
+_BOUNDS = (0.01, 3.2)  # of the record: between these a refit moves the time constant
 _NOT_COLD = 0.05  # of the heat that the largest input would lead to
-_PLAIN = 2  # parameters where the zero stays
+_PLAIN = 2  # parameters, if the zero does not move
 _BOTH_WAYS = 0.5  # of the range: the input at which a device that is driven both ways stays cold
 
 

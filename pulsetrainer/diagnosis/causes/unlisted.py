@@ -1,7 +1,7 @@
 """the output depends on something that is in no list: y + sum_j f_j(z_j), each z_j a state of the device.
 
-Of some parts the curve is added to the gain instead of the output: y + f_j(z_j) (y - y0), y0 that of empty
-memory.
+For some parts the curve is added to the gain instead of the output: y + f_j(z_j) (y - y0), with y0 the output
+of empty memory.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 KNOTS = 8  # of each curve: even between the ends of the state; its first value is 0
 _STILL = 0.004  # of the range: an input that stays within it rests
-_BACK = 0.02  # of the range: a turn of the input is known when it has come back so far
-_STEEPEST = 1.0  # of the span: a curve that goes further at one of its points has no samples there
+_BACK = 0.02  # of the range: a turn of the input is known once it has come back this far
+_STEEPEST = 1.0  # of the span: a curve that exceeds this at a point has no samples there
 _SMALL_CHANGE = 1e-4  # of the span: steps of the derivatives, of the curve ...
 _SMALL_TIME_S = 1e-3  # ... and of a time constant
-_CONSTANTS = 3  # of a part: its state, and the ends of its curve
+_CONSTANTS = 3  # constants of a part: its state, and the two ends of its curve
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """the output has a part that follows the speed of the input: y + c LP(sgn(u') abs(u')^p; tau).
 
-In proportion to it as in a fluid (p = 1), to its root as excess losses (1/2), or to its square as at an
-orifice (2): each is tried.
+The part may be proportional to the speed, as in a fluid (p = 1), to its root, as excess losses are (1/2), or
+to its square, as at an orifice (2). Each power is tried.
 """
 
 from __future__ import annotations

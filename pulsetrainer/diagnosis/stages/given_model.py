@@ -14,10 +14,10 @@ records.
 - The model as given may be *far off* (1 % of the span) where refitted weights are not (they leave a fifth of
   that). If a drift of the zero then brings it near, that drift is the finding: refitted weights hide a drift
   that is over soon.
-- If the model is far off on records in which the input never turned, there is no verdict: a first stroke
-  differs from all later ones.
-- If it is far off although it was identified from these very records, nothing can have changed since, and the
-  verdict is `unknown`.
+- If the model is far off on records in which the input never turned, they cannot show a change, since a first
+  stroke differs from all later ones: `none` becomes `inconclusive`.
+- If it is far off although it was identified from these very records, nothing can have changed since. Without
+  a cause found, the verdict is then `unknown`.
 - If it is far off for none of these reasons, the device is in another condition, and `condition-change` comes
   first. If that change is all but a thousandth of the squared error, other causes would only repair the rest
   of it, and are withdrawn.
@@ -25,8 +25,8 @@ records.
 In these cases being far off is no change of condition:
 
 - The causes found, added to the prediction of the model as given, bring it near.
-- Refitted weights are far off too, on blocks that were left out: then no Preisach model describes the device,
-  and the verdict is `unknown`.
+- Refitted weights are far off too, on blocks that were left out: then no Preisach model describes the device.
+  Without a cause found, the verdict is then `unknown`.
 - The model is of the wrong kind, as these records or its own show.
 - The zero alone seems to have moved, and the input left the model's range: what was switched there stays so,
   and looks like another zero.

@@ -7,11 +7,11 @@ The p-value of a cause is the share of draws with a score that is at least as un
 therefore holds for the search as a whole, and not for one cause alone. Causes with p of at most 0.01 go on to
 the joint fit.
 
-From the same draws follows how small an effect of each cause would have shown. Such an effect is large enough
-that the test finds it in nine of ten records, and that what the weights leave of it is relevant. It is so
-even if what looks like the cause already works against it. For a cause that has entered the model since, the
-present noise is used. For a cause that the weights can absorb almost entirely no such figure is given: what
-they leave of it depends only on how fine the levels are.
+The same draws show how small an effect of each cause would have been seen. Such an effect is large enough
+that the test finds it in nine of ten records, and that what the weights leave of it is relevant. Both hold
+even if what already looks like the cause in this record works against it. For a cause that has entered the
+model since, the present noise is used. For a cause that the weights can absorb almost entirely no such figure
+is given: what they leave of it depends only on how fine the levels are.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ A cause is *jagged* if it leaves what no refit can take away, such as sticking o
 more than 0.2 % of the span. The verdict is the first of these that applies:
 
 - If much is unexplained: the jagged cause that a gate saw, or without one `unknown`, whatever else was found.
-- The cause that explains most, and after it what a gate on the raw data saw. The gate comes first if all
+- The cause that explains most; without one, what a gate on the raw data saw. The gate comes first if all
   other causes together explain less than half a per cent of the span.
 - If there is neither: `inconclusive`, if the record could not have shown half a per cent of the span of a
   common cause; otherwise `none`.
