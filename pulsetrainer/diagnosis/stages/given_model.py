@@ -10,8 +10,8 @@ records.
   else the cause is `unknown`.
 - If the model as given leaves less than the search's best, the search found only faults of its own coarser
   levels: they are withdrawn. What the given model leaves may still be more than noise, and is then `unknown`;
-  otherwise the verdict is `none`, or `inconclusive` if the records lack what would show a common cause: rates,
-  rests or length. What only the coarser levels hide does not count.
+  otherwise the verdict is `none`, or `inconclusive` if the records lack what would show a common cause
+  (rates, rests or length). What only the coarser levels hide does not count.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
   drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
 - If it is far off on records in which the input never turned, there is no verdict: a first stroke differs
