@@ -100,7 +100,7 @@ ADVICE: Mapping[str, str] = {
     ),
     "inconclusive": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. "
-        f"To see it, {AGAIN}"
+        f"To see that, {AGAIN}"
     ),
     "extend, or late": (
         "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "

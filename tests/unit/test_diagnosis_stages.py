@@ -1936,7 +1936,7 @@ def _given(
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), *map(Evidence, ("extended", "not whole"))),
-        current=SimpleNamespace(rms=left, terms=(), squares=np.inf),
+        current=SimpleNamespace(rms=left, terms=(), names=(), squares=np.inf),
         baseline=SimpleNamespace(rms=refitted, squares=100.0 * (1.0 + left_out**2)),  # beside the noise
         floor=replace(state.floor, noise=0.0, single=single),
         by_contrast={"load-dependence": ()},
@@ -1984,6 +1984,15 @@ def test_a_better_model_that_misses_something_is_unknown(monkeypatch, error, ver
     monkeypatch.setattr(state_module.State, "unexplained", property(lambda self: True))
     after = _given(monkeypatch, RAMP + error, findings=(_finding("creep", 20.0),))
     assert (after.verdict, after.extends) == (verdict, False)
+
+
+@pytest.mark.parametrize(("lacks", "verdict"), [((), "none"), ((residual.RATES,), "inconclusive")])
+def test_a_better_model_of_a_record_that_lacks_rates_proves_nothing(monkeypatch, lacks, verdict):
+    """What its finer levels would show does not count as hidden; what no level can show does."""
+    blind = {"creep": 0.02}
+    after = _given(monkeypatch, RAMP, findings=(_finding("creep", 20.0),), detectable=blind, lacks=lacks)
+    assert (after.verdict, after.extends) == (verdict, False)
+    assert _given(monkeypatch, RAMP, findings=(), detectable={}, lacks=lacks).verdict == "none"
 
 
 @pytest.mark.parametrize(("wrong", "direction", "name"), [(0.44, 0.74, "viscous"), (0.46, 0.74, "unknown")])

@@ -10,7 +10,8 @@ records.
   `viscous`; otherwise the cause is `unknown`.
 - If the model as given leaves less than the best model of the search, the search found only faults of its own
   coarser levels: they are withdrawn. What the given model leaves may still be more than noise, and is then
-  `unknown`; otherwise the verdict is `none`, whatever the coarser levels could have shown.
+  `unknown`; otherwise the verdict is `none`, or `inconclusive` if the records lack what would show a common
+  cause (rates, rests or length). What only the coarser levels hide does not count.
 - The model as given may be *far off* (1 % of the span) where refitted weights are not (they leave a fifth of
   that). If a drift of the zero then brings it near, that drift is the finding: refitted weights hide a drift
   that is over soon.
@@ -82,8 +83,9 @@ def stage(state: State) -> State:
     elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        if state.verdict == "none" and _unexplained(state, judged):
-            state = replace(state, verdict="unknown")
+        blind = state.blind and state.lacks and not state.question.quick
+        if state.verdict == "none" and (_unexplained(state, judged) or blind):
+            state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
     changed = _changed(state, judged, noise)
     if changed is not None:
         state, more = _of_a_change(state, judged, changed, noise)
