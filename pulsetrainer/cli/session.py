@@ -78,7 +78,7 @@ def session(
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
     job.uses(*(path for path, name in zip(tables, names, strict=True) if str(path) == name))
-    from pulsetrainer.cli.hands import Hands
+    from pulsetrainer.cli.keys import Keys
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
@@ -90,22 +90,22 @@ def session(
     check_model(loaded)
     if seed is None:  # in a quiz one that nobody can look up; the file tells it when all is answered
         seed = secrets.randbelow(_MOST_SEED) if quiz else 0
-    hands = Hands([Path(name).stem if name.lower().endswith(".csv") else name for name in names])
+    keys = Keys([Path(name).stem if name.lower().endswith(".csv") else name for name in names])
     chosen, rates = with_quiz(
         Programme(
-            hands.names,
+            keys.names,
             rate=rate,
             amplitude=amplitude,
             beats=beats,
             minutes=minutes,
-            changes=[Change(*row) for row in read_changes(changes, hands.names)] if changes else (),
+            changes=[Change(*row) for row in read_changes(changes, keys.names)] if changes else (),
         ),
         quiz,
-        read_answers(answers, hands.names, quiz)
+        read_answers(answers, keys.names, quiz)
         if answers
-        else (lambda _: (hands.names[0], 0.0))  # at once, since nobody knows when
+        else (lambda _: (keys.names[0], 0.0))  # at once, since nobody knows when
         if dry_run
-        else hands.answer,
+        else keys.answer,
         seed,
     )
     if amplitude < 1.0:
@@ -121,7 +121,7 @@ def session(
         "track_heat": track_heat,
     }
     shapes = [read_pulse(name) for name in names]
-    steered = hands.steer(job.screen, chosen, shapes, by_key=answers is None)
+    steered = keys.steer(job.screen, chosen, shapes, by_key=answers is None)
     if dry_run:
         job.check_device()
         with job.working("rehearsing") as progress:

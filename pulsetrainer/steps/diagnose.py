@@ -8,7 +8,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Model, Run
 from pulsetrainer.diagnosis import procedure
-from pulsetrainer.diagnosis.answered import diagnosis_of
+from pulsetrainer.diagnosis.artefact import diagnosis_of
 from pulsetrainer.diagnosis.question import question_of
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.arguments import named, several

@@ -17,7 +17,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import (
     advised,
-    answered,
+    artefact,
     experiment,
     floor,
     intervals,
@@ -1112,7 +1112,7 @@ def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(
             scores=[] if p is None else [SimpleNamespace(p_value=p, cause=CAUSE["creep"])]
         ),
     )
-    one = answered._advice(state)
+    one = artefact._advice(state)
     assert one.kind == told
     if told in ("none, seen", "none, correct", "none, small", "none, small, quick"):
         assert one.names == (found or ("creep",))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pulsetrainer.artefacts.model import Extension
-from pulsetrainer.diagnosis import answered, design, fitting, residual, velocity, wear, wording
+from pulsetrainer.diagnosis import artefact, design, fitting, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
@@ -2363,9 +2363,9 @@ def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, 
 def test_what_the_model_says_of_its_record_is_told_once():
     """The same sentence stood above itself where the diagnosis came to it too."""
     model = SimpleNamespace(fit=SimpleNamespace(warning="F follows the velocity"))
-    assert answered._said(model, ["F follows the velocity.", "more."]) == ("F follows the velocity.", "more.")
-    assert answered._said(model, ["more."]) == ("Of the model as given: F follows the velocity.", "more.")
-    assert answered._said(SimpleNamespace(fit=None), ["more."]) == ("more.",)
+    assert artefact._said(model, ["F follows the velocity.", "more."]) == ("F follows the velocity.", "more.")
+    assert artefact._said(model, ["more."]) == ("Of the model as given: F follows the velocity.", "more.")
+    assert artefact._said(SimpleNamespace(fit=None), ["more."]) == ("more.",)
 
 
 @pytest.mark.parametrize(
@@ -2378,5 +2378,5 @@ def test_all_causes_together_have_a_gain_where_they_extend_the_model(found, exte
     state = SimpleNamespace(
         baseline=baseline, current=current, extends=extends, held_out=HeldOut(0.9), floor=None
     )
-    told = answered._held_out_gain(state)
+    told = artefact._held_out_gain(state)
     assert np.isnan(told) if gain is None else told == pytest.approx(gain)

@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pulsetrainer.artefacts import Model
-from pulsetrainer.diagnosis.answered import extended_model, faults_of, percent_of_samples, rms_of, undone
+from pulsetrainer.diagnosis.artefact import extended_model, faults_of, percent_of_samples, rms_of, undone
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.stages import begin

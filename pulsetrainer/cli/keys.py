@@ -28,7 +28,7 @@ class Steered:
     by_key: bool = False  # a person presses them, and what comes next depends on it
 
 
-class Hands:
+class Keys:
     """What a person presses; ``names`` are those of the pulses."""
 
     def __init__(self, names: Sequence[str]) -> None:
