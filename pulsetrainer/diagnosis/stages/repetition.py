@@ -11,12 +11,12 @@ that happened in this record, and will not in the next. What equal loops show wa
 
 The cause that repeats least goes first; the others are then refitted without it and tested again, since they
 had been fitted beside it. A cause whose strength may be zero, and that explains less than a tenth or half a
-per cent of the span, was not found: it only improves the formula of another cause, if anything. Nor was a
-slow fault of the measurement that the weights and the causes beside it can absorb almost entirely: it would
-be taken out as large as it was fitted, from a device that never had it. This is reported, since it may be
-there all the same. But if no other cause is slow, and it predicts nearly all that can be lowered on time that
-was left out, it is there. What is left beside one that is not there is refitted without it, and a step is
-tested again for whether it only settles.
+per cent of the span, was not found: it only improves the formula of another cause, if anything. Nor was one
+that does not repeat and explains less than both. Nor was a slow fault of the measurement that the weights and
+the causes beside it can absorb almost entirely: it would be taken out as large as it was fitted, from a
+device that never had it. This is reported, since it may be there all the same. But if no other cause is slow,
+and it predicts nearly all that can be lowered on time that was left out, it is there. What is left beside one
+that is not there is refitted without it, and a step is tested again for whether it only settles.
 """
 
 from __future__ import annotations
@@ -108,10 +108,10 @@ def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:
-    """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
+    """Whether a finding may be nothing, or does not repeat, and would matter little."""
     share = finding.explains_percent / PERCENT
-    little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
-    return MAY_BE_NOTHING in finding.doubts and little
+    little = (share < LIMITS.mends, state.rms_of(share) < LIMITS.matters * state.floor.span)
+    return (MAY_BE_NOTHING in finding.doubts and any(little)) or (DOUBT in finding.doubts and all(little))
 
 
 def _is_held(state: State, finding: Finding) -> bool:
