@@ -78,8 +78,8 @@ class ConditionChange(Cause):
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Offset and gain of the second record, then those of each later one, by its number."""
-        later = range(3, frame.records + 1)
-        more = [replace(q, name=f"{q.name} {k}") for k in later for q in self.parameters]
+        later = range(2, frame.records)
+        more = [replace(q, name=f"{q.name} {k + 1}") for k in later for q in self.parameters]
         return (*self.parameters, *more)
 
     def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
