@@ -61,7 +61,7 @@ def heated(t: np.ndarray, u: np.ndarray, y: np.ndarray, tau: float) -> np.ndarra
 # What is added to the output, of any size: t, u, y, the share of the whole time, a period, and a draw
 ADDED: dict[str, Callable[..., np.ndarray]] = {
     "offset-drift": lambda t, u, y, w, T, r: (t - t[0]) ** r.uniform(0.7, 1.3),
-    "step": lambda t, u, y, w, T, r: 1.0 * (w > r.uniform(0.35, 0.65)),
+    "step": lambda t, u, y, w, T, r: 1.0 * (w > r.uniform(0.4, 0.6)),
     "periodic": lambda t, u, y, w, T, r: np.sin(2 * np.pi * t * r.uniform(7, 23) / T),
     "creep": lambda t, u, y, w, T, r: late(y, t, r.uniform(0.3, 2.0) * T),
     "viscous": lambda t, u, y, w, T, r: late(np.gradient(u, t), t, 3 * np.median(np.diff(t))),
