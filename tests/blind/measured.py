@@ -45,11 +45,6 @@ def late(x: np.ndarray, t: np.ndarray, tau: float) -> np.ndarray:
     return out
 
 
-def sized(effect: np.ndarray, rms: float) -> np.ndarray:
-    """Return an effect of that rms."""
-    return effect * (rms / np.std(effect))
-
-
 def wild(y: np.ndarray, size: float, rng: Draw) -> np.ndarray:
     """One sample in 200, off by five to fifteen times ``size``."""
     found, at = y.copy(), rng.choice(y.size, y.size // 200, replace=False)
@@ -57,45 +52,62 @@ def wild(y: np.ndarray, size: float, rng: Draw) -> np.ndarray:
     return found
 
 
-def heated(t: np.ndarray, u: np.ndarray, y: np.ndarray, size: float, tau: float) -> np.ndarray:
+def heated(t: np.ndarray, u: np.ndarray, y: np.ndarray, tau: float) -> np.ndarray:
     """A gain about the lowest output that falls with the averaged square of the input, from its lowest."""
     heat = late((u - u.min()) ** 2, t, tau)
-    change = (y - y.min()) * (heat - heat[0])
-    return y - sized(change, size)
+    return (y.min() - y) * (heat - heat[0])
 
 
-# t, u, y, the size of the effect, a time of the record, and a draw
-EFFECTS: dict[str, Callable[..., np.ndarray]] = {
-    "none": lambda t, u, y, s, T, r: y,
-    "offset-drift": lambda t, u, y, s, T, r: y + sized((t - t[0]) ** r.uniform(0.7, 1.3), s),
-    "step": lambda t, u, y, s, T, r: y + 2.0 * s * (t > t[0] + r.uniform(0.3, 0.7) * np.ptp(t)),
-    "periodic": lambda t, u, y, s, T, r: y + sized(np.sin(2 * np.pi * t * r.uniform(7, 23) / T), s),
-    "creep": lambda t, u, y, s, T, r: y + sized(late(y, t, r.uniform(0.3, 2.0) * T), s),
-    "output-lag": lambda t, u, y, s, T, r: late(y, t, s / np.std(y) * T / 5.0),
-    "delay": lambda t, u, y, s, T, r: np.interp(t - s / np.std(y) * T / 5.0, t, y),
-    "viscous": lambda t, u, y, s, T, r: y + sized(late(np.gradient(u, t), t, 3 * np.median(np.diff(t))), s),
-    "thermal-drift": lambda t, u, y, s, T, r: heated(t, u, y, s, r.uniform(0.5, 3.0) * T),
-    "quantisation": lambda t, u, y, s, T, r: np.round(y / s) * s,
-    "outliers": lambda t, u, y, s, T, r: wild(y, s, r),
-    "saturation": lambda t, u, y, s, T, r: np.minimum(y, y.max() - r.uniform(2.0, 5.0) * s),
+# What is added to the output, of any size: t, u, y, the share of the whole time, a period, and a draw
+ADDED: dict[str, Callable[..., np.ndarray]] = {
+    "offset-drift": lambda t, u, y, w, T, r: (t - t[0]) ** r.uniform(0.7, 1.3),
+    "step": lambda t, u, y, w, T, r: 1.0 * (w > r.uniform(0.4, 0.6)),
+    "periodic": lambda t, u, y, w, T, r: np.sin(2 * np.pi * t * r.uniform(7, 23) / T),
+    "creep": lambda t, u, y, w, T, r: late(y, t, r.uniform(0.3, 2.0) * T),
+    "viscous": lambda t, u, y, w, T, r: late(np.gradient(u, t), t, 3 * np.median(np.diff(t))),
+    "thermal-drift": lambda t, u, y, w, T, r: heated(t, u, y, r.uniform(0.5, 3.0) * T),
 }
+# What becomes of the output: t, y, a size, the lag by which a sine of that period is off as much, and a draw
+CHANGED: dict[str, Callable[..., np.ndarray]] = {
+    "none": lambda t, y, s, lag, r: y,
+    "output-lag": lambda t, y, s, lag, r: late(y, t, lag),
+    "delay": lambda t, y, s, lag, r: np.interp(t - lag, t, y),
+    "quantisation": lambda t, y, s, lag, r: np.round(y / s) * s,
+    "outliers": lambda t, y, s, lag, r: wild(y, s, r),
+    "saturation": lambda t, y, s, lag, r: np.minimum(y, y.max() - r.uniform(2.0, 5.0) * s),
+}
+EFFECTS = (*ADDED, *CHANGED)
 HELD = {"output-lag", "delay", "creep", "thermal-drift"}  # at one rate
+
+
+def shown(tables: list[np.ndarray], effect: str, percent: float, rng: Draw) -> list[np.ndarray]:
+    """Outputs of records (t, u, y) of one device, with an effect of one strength in all of them."""
+    size = 0.01 * percent * np.ptp(np.concatenate([y for *_, y in tables]))
+    t, u, _ = tables[-1]
+    ranges = np.abs(np.diff(np.round(u / np.ptp(u), 1))).sum()  # of the input's path, two in a period
+    period = 2.0 * np.ptp(t) / ranges
+    state, found = rng.bit_generator.state, []
+    for k, (t, u, y) in enumerate(tables):
+        rng.bit_generator.state = state  # the same device each time
+        if effect in CHANGED:
+            found.append(CHANGED[effect](t, y, size, 0.01 * percent * period * np.sqrt(2.0) / np.pi, rng))
+        else:
+            share = (k + (t - t[0]) / np.ptp(t)) / len(tables)
+            found.append(ADDED[effect](t, u, y, share, period, rng))
+    if effect in CHANGED:
+        return found
+    rms = np.sqrt(np.mean([np.var(one) for one in found])) if effect != "step" else 0.5
+    return [y + one * (size / rms) for (*_, y), one in zip(tables, found, strict=True)]
 
 
 def judged(where: str, effect: str, percent: float, rng: Draw) -> tuple[bool, str]:
     """Whether the answer is right, and what it was."""
     tables = [np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1).T for name in RECORDS[where]]
-    size = 0.01 * percent * np.ptp(np.concatenate([y for *_, y in tables]))
-    t, u, _ = tables[-1]
-    turns = np.count_nonzero(np.diff(np.sign(np.diff(np.round(u / np.ptp(u), 1)))))
-    period = 2.0 * np.ptp(t) / max(turns / 2.0, 1.0)
-    runs, state = [], rng.bit_generator.state
+    runs = []
     with tempfile.TemporaryDirectory() as folder:
-        for k, (t, u, y) in enumerate(tables):
-            rng.bit_generator.state = state  # the same device each time
+        for k, ((t, u, _), y) in enumerate(zip(tables, shown(tables, effect, percent, rng), strict=True)):
             table = Path(folder, f"{k}.csv")
-            shown = EFFECTS[effect](t, u, y, size, period, rng)
-            np.savetxt(table, np.c_[t, u, shown], "%.7g", ",", header="t,u,y", comments="")
+            np.savetxt(table, np.c_[t, u, y], "%.7g", ",", header="t,u,y", comments="")
             runs.append(pt.read_table(table, input="u", output="y", time="t"))
     found = pt.diagnose(runs, pt.identify(runs))
     named = {name for one in found.found for name in (one.cause, *one.confounded_with)} - {"condition-change"}

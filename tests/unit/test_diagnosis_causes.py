@@ -19,6 +19,7 @@ from pulsetrainer.diagnosis import causes, wording
 from pulsetrainer.diagnosis.causes import condition_change, library, outliers, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
 from pulsetrainer.diagnosis.causes.step import _split
+from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_beside_hum, noise_of, spacing_of
 from pulsetrainer.diagnosis.scale import Scale
@@ -194,6 +195,23 @@ def test_simple_formulas():
     np.testing.assert_allclose(_shown("clock-skew", T, 0.01)[:300], 1.01 * T[:300], atol=1e-12)
     np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=0), y)
     np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=1), 1.1 * y + 0.4)
+    np.testing.assert_allclose(_shown("condition-change", y, 9.0, 9.0, 0.4, 0.1, record=2), 1.1 * y + 0.4)
+
+
+def test_each_later_record_has_a_condition_of_its_own():
+    """One offset and gain for all of them made a step of what the third differed from the second by."""
+    cause, frames = CAUSE["condition-change"], [_frame(record=k, records=3) for k in range(3)]
+    assert [one.name for one in cause.quantities(frames[0])] == ["offset", "gain", "offset 3", "gain 3"]
+    assert [one.name for one in cause.quantities(_frame(records=2))] == ["offset", "gain"]
+    assert cause.sign("offset 3", -1) == cause.sign("offset", -1) == -1
+    assert cause.sign("gain 3", -1) == cause.sign("gain", -1) == 1
+    (block,) = cause.starts(frames, [])
+    moved = np.asarray([[np.ptp(cause.on_output(T, one, frame) - T) for frame in frames] for one in block])
+    changed = np.asarray([[cause.on_output(T, one, frame)[-1] != T[-1] for frame in frames] for one in block])
+    assert changed.tolist() == [[False, True, False]] * 2 + [[False, False, True]] * 2
+    assert (moved > 1e-9).tolist() == [[False] * 3, [False, True, False], [False] * 3, [False, False, True]]
+    known = [Estimate("", at, "", at - 1.0, at + 1.0) for at in (0.0, 0.0, 0.0, 2.0)]
+    assert not may_be_nothing(cause.strengths_of(known))  # only the gain of the third differs
 
 
 @pytest.mark.parametrize(("per", "frequency"), [(1, 40.0), (3, 50.0), (4, 120.0), (3, 0.0)])

@@ -1619,6 +1619,23 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
 
 
 @pytest.mark.parametrize(
+    ("explains", "span", "found"), [(9.9, 200.0, False), (10.1, 250.0, True), (9.9, 198.0, True)]
+)
+def test_what_does_not_repeat_and_matters_little_is_not_found(monkeypatch, explains, span, found):
+    """Less than a tenth, and less than half a per cent of the span: a creep of -1.8 % in a cable drive."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
+    repeats_least = iter(({"viscous"}, set()))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: next(repeats_least))
+    findings = (_finding("condition-change", 80.0), _finding("viscous", explains))
+    fitted = _fit(500.0, "condition-change", "viscous")
+    after = repetition.stage(_state(fitted, findings=findings, floor=replace(FLOOR, span=span)))
+    assert [one.found for one in after.findings] == [True, found]
+    assert after.findings[1].doubts == (repetition.DOUBT,)
+    assert after.repeated.names == ("condition-change",)
+    assert after.current.names == (("condition-change", "viscous") if found else ("condition-change",))
+
+
+@pytest.mark.parametrize(
     ("name", "beside", "added", "found"),
     [
         ("offset-drift", "creep", 2870.0, False),  # of which 100 are missed without it

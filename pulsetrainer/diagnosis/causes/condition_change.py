@@ -1,4 +1,4 @@
-"""gain or offset differs from record to record: y + b + g (y - y0) in all records but the first.
+"""gain or offset differs from record to record: y + b + g (y - y0), with b and g of each but the first.
 
 y0 is the output of empty memory.
 
@@ -11,14 +11,17 @@ offset that bring the given prediction to the record say how: y = (1 + g) M(u) +
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.finding import Estimate
 
 _TRIED = 0.003  # of the span, and of the gain
 # Against the model as given
@@ -31,11 +34,11 @@ _BLOCKS = 10  # of the jackknife: neighbouring samples are not independent
 
 
 class ConditionChange(Cause):
-    """One gain and offset for the later records."""
+    """A gain and an offset of each later record."""
 
     id = "condition-change"
     title = "gain or offset of the later records differs from that of the first"
-    formula = "y + b + g (y - y0) in all records but the first"
+    formula = "y + b + g (y - y0), b and g of each record but the first"
     signature = "each record agrees with itself, but they differ from one another"
     excitation = "the same signal twice, in the two conditions"
     source = "Lei et al., Phil. Trans. R. Soc. A 378, 2020: one fit for each protocol"
@@ -73,11 +76,29 @@ class ConditionChange(Cause):
         ),
     }
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Offset and gain of the second record, then those of each later one, by its number."""
+        later = range(2, frame.records)
+        more = [replace(q, name=f"{q.name} {k + 1}") for k in later for q in self.parameters]
+        return (*self.parameters, *more)
+
+    def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
+        """Return all of them."""
+        return parameters
+
+    def sign(self, name: str, polarity: int) -> int:
+        """Return that of the same parameter of the second record."""
+        return super().sign(name.partition(" ")[0], polarity)
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        return [[(_TRIED * frames[0].span, 0.0), (0.0, _TRIED)]] if len(frames) > 1 else []
+        tried = np.diag(np.tile((_TRIED * frames[0].span, _TRIED), len(frames) - 1)).tolist()
+        return [[tuple(one) for one in tried]] if tried else []
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return y if frame.record == 0 else y + values[0] + values[1] * (y - frame.zero)
+        if frame.record == 0:
+            return y
+        offset, gain = values[2 * frame.record - 2 : 2 * frame.record]
+        return y + offset + gain * (y - frame.zero)
 
 
 @dataclass(frozen=True)

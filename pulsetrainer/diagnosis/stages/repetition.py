@@ -16,6 +16,7 @@ Some causes count as not found at all:
 
 - A cause whose strength may be zero, and that explains less than a tenth of what can be lowered, or less than
   half a per cent of the span. It only improves the formula of another cause, if anything.
+- A cause that does not repeat, and explains less than both of these.
 - A slow fault of the measurement that the weights and the other causes can absorb almost entirely. It would
   be taken out as large as it was fitted, from a device that never had it. It is reported, since it may be
   there all the same. It does count as found if no other cause is slow, and it predicts nearly all that can be
@@ -114,10 +115,10 @@ def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:
-    """Whether a strength may be zero, and the effect is small: beside the other causes, or at all."""
+    """Whether a finding may be nothing, or does not repeat, and would matter little."""
     share = finding.explains_percent / PERCENT
-    little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
-    return MAY_BE_NOTHING in finding.doubts and little
+    little = (share < LIMITS.mends, state.rms_of(share) < LIMITS.matters * state.floor.span)
+    return (MAY_BE_NOTHING in finding.doubts and any(little)) or (DOUBT in finding.doubts and all(little))
 
 
 def _is_held(state: State, finding: Finding) -> bool:
