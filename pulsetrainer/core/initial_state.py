@@ -26,8 +26,12 @@ _APART = 0.005  # of the output's span: a first stroke that runs so far from the
 _TIMES = 2.0  # ... if these run nearer to each other by this factor
 _MET = 0.5  # of how far they lie apart: strokes that differ by no more at the other end have met there
 _LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
+_CLOSING = (
+    0.02  # of the output's span: where nothing says how alike strokes are, so far apart they must begin
+)
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
+_THIRDS = 3  # of a stroke: the first and the last are compared
 _FEWEST = 2  # strokes that should be alike: one alone says nothing of how alike
 
 
@@ -86,12 +90,7 @@ def left_out_words(samples: int) -> str:
 
 
 def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> int:
-    """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart.
-
-    How far apart strokes lie that should be alike is read off the later ones from the same end; where there
-    is but one, off those from the other end. At the other end all memory is wiped out: what still differs
-    there is no matter of what came before.
-    """
+    """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart."""
     reach = high - low
     away, back = inputs - low, high - inputs
     if away[0] > NEAR * reach:
@@ -99,20 +98,36 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     all_strokes = _strokes(away, outputs, reach)
     first, later = all_strokes[:1], [one for one in all_strokes[1:] if _told(one, reach)]
     others = [one for one in _strokes(back, outputs, reach) if _told(one, reach)]
-    known = later if len(later) > 1 else others
-    if not (first and _told(first[0], reach) and later and len(known) >= _FEWEST):
+    if not (first and _told(first[0], reach) and later):
         return 0
-    own, *usual = _side_by_side(first + later, reach)
-    apart = root_mean_square(own - np.median(usual, axis=0))
+    differs = _is_apart(first + later, later if len(later) > 1 else others, float(np.ptp(outputs)), reach)
+    return _second_stroke(away, back, reach) if differs else 0
+
+
+def _is_apart(
+    strokes: Sequence[tuple[FloatArray, FloatArray]],
+    known: Sequence[tuple[FloatArray, FloatArray]],
+    span: float,
+    reach: float,
+) -> bool:
+    """Whether the first of the strokes from one end differs from the later ones, as no drift or step does.
+
+    How far apart strokes lie that should be alike is read off the ``known`` ones: the later ones from the
+    same end; where there is but one, those from the other end. At the other end all memory is wiped out: what
+    still differs there is no matter of what came before. Where too few are known, strokes must begin far
+    apart, and come together on the way.
+    """
+    own, *usual = _side_by_side(strokes, reach)
+    gap = own - np.median(usual, axis=0)
+    if len(known) < _FEWEST:
+        begins, ends = (abs(float(np.mean(part))) for part in np.array_split(gap, _THIRDS)[:: _THIRDS - 1])
+        return begins > _CLOSING * span and ends <= _MET * begins
+    apart = root_mean_square(gap)
     beside = _side_by_side(known, reach)
     alike = max(root_mean_square(one - np.median(beside, axis=0)) for one in beside)
-    if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
-        return 0
-    if (
-        _apart_at_the_far_end(first + later, reach) > _MET * apart
-    ):  # a step, heat, creep: no memory lasts so long
-        return 0
-    return _second_stroke(away, back, reach)
+    if apart <= max(_APART * span, _TIMES * alike):
+        return False
+    return _apart_at_the_far_end(strokes, reach) <= _MET * apart  # a step, heat or creep would still differ
 
 
 def second_stroke(inputs: FloatArray, low: float, high: float) -> int:

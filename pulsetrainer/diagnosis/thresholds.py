@@ -262,6 +262,7 @@ class Thresholds:
     no_turn: float = 0.01  # of the range of the input: half the size of the smallest reversal that is a turn
     worth_recording: float = 1.5  # times the difference seen here: an experiment below is not advised
     first_stroke_most: float = 0.25  # of a record: a longer piece is not left out as a first stroke
+    first_stroke_share: float = 0.5  # of what causes explain: with more in first strokes, these go
 
     # Words
     mains_Hz: tuple[float, float] = (50.0, 60.0)  # of all grids except some of railways

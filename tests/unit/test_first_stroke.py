@@ -78,6 +78,36 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
     assert first_stroke_words(u, y, 0.0, 5.0) == ""
 
 
+ONCE = (0.0, 5.0, 0.0, 4.0, 1.0, 3.5, 1.5, 4.2, 0.8, 3.0, 2.0, 4.0, 0.6, 3.2, 1.1)
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_a_first_stroke_shows_against_a_single_later_one(down):
+    """It begins elsewhere and comes nearer on the way; a step or a drift of the zero keeps its distance."""
+    u, y = _record(cycled=False, down=down, turns=ONCE)
+    assert known_from(u, 0.0, 5.0, y) * DT_S == pytest.approx(2.0, abs=0.06)
+    u, y = _record(cycled=True, down=down, turns=ONCE)
+    span, after = np.ptp(y), np.arange(u.size)
+    assert known_from(u, 0.0, 5.0, y) == 0
+    assert known_from(u, 0.0, 5.0, y + 0.1 * span * (after > 150)) == 0
+    assert known_from(u, 0.0, 5.0, y + 0.1 * span * after / u.size) == 0
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "left_out"),
+    [
+        (0.021, 0.0104, True),  # shares of the output's span, of the first and the last third
+        (0.019, 0.0, False),  # too near for a single later stroke to tell
+        (0.021, 0.0106, False),  # it does not come nearer by half
+    ],
+)
+def test_how_a_first_stroke_differs_from_a_single_later_one(begins, ends, left_out):
+    """The means of the first and of the last seven and six of twenty places count."""
+    u = np.concatenate([np.linspace(a, b, 501)[1:] for a, b in pairwise((0.0, 5.0, 0.0, 4.0, 1.0))])
+    apart = np.interp(u, [1.5, 2.5], [begins, ends]) * (np.arange(u.size) < 500)
+    assert known_from(u, 0.0, 5.0, u - 5.0 * apart * (u < 4.94)) == (494 if left_out else 0)
+
+
 @pytest.mark.parametrize("down", [False, True])
 def test_a_first_stroke_ends_where_the_input_turns_before_an_end_that_it_never_reaches(down):
     """A model up to 6.5, loops up to 5: not the whole slow half of such a record is left out."""

@@ -57,3 +57,23 @@ def test_a_first_stroke_that_creep_hides_is_left_out_once_the_creep_is_known(cyc
     assert u[max(left_out - 1, 0)] == pytest.approx(0.0 if cycled else 5.0, abs=0.1)
     amplitude = said.findings[0].parameters[0]
     assert amplitude.lower < AMPLITUDE < amplitude.upper
+
+
+@pytest.mark.parametrize(
+    "seed", [3, pytest.param(4, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)]
+)
+def test_a_first_stroke_too_short_to_be_compared_is_no_cause(seed):
+    """Of six samples: it was called heat, and most of what that explained lay within it."""
+    rng = np.random.default_rng(seed)
+    turns = np.concatenate(([0.0, 5.0, 0.0], np.ravel(rng.uniform([2.2, 0.0], [5.0, 2.7], (60, 2)))))
+    rates = np.resize([0.8, 0.25], turns.size - 1)
+    steps = np.maximum(np.abs(np.diff(turns)) // rates, 1.0)
+    u = np.interp(np.arange(1200.0), np.cumsum([0, *steps]), turns)
+    plays, found = np.zeros(8), []
+    for value in u.tolist():
+        plays = np.clip(plays, value - RADII, value + RADII)
+        found.append(plays.sum() + 2.0 * value)
+    y = np.asarray(found) + 0.003 * np.ptp(found) * rng.standard_normal(u.size)
+    said = diagnose(Question([Record(u, y, dt_s=DT_S)], 0.0, 5.0, np.random.default_rng(0)))
+    assert [one.cause.id for one in said.findings if one.found] == []
+    assert [note.partition(" samples)")[0][-1] for note in said.question.notes] == ["6"]

@@ -3,9 +3,12 @@
 The first stroke of a device that was not cycled before differs from all later ones, and is left out before
 anything is fitted. If the device creeps, rings or runs in, the later strokes differ as well, and hide the
 first one. So it is looked for once more in the output less what the causes add. If it stands out there, it is
-left out, and the search begins again. If it does not, but more than noise is left, the first stroke may have
-kept the causes from being found. The search is then tried without it, and that result counts if it leaves
-only noise.
+left out, and the search begins again.
+
+If it does not, the search is tried without it in two cases: where more than noise is left, since the first
+stroke may have kept the causes from being found; and where more than half of what the causes explain lies
+within first strokes. There, one that could not be compared with others looks like heat, or like a drift of
+the zero that ends with it. The result counts if it leaves only noise.
 """
 
 from __future__ import annotations
@@ -34,10 +37,19 @@ def stage(state: State) -> State:
     again = _without(state, [a if a > k else 0 for a, k in zip(apart, known, strict=True)])
     if again is not None:
         return again
-    if state.is_whole(state.current) or state.jagged:
+    second = [second_stroke(u, 0.0, 1.0) for u in inputs]
+    if state.jagged or (state.is_whole(state.current) and not _explains_only(state, second)):
         return state
-    again = _without(state, [second_stroke(u, 0.0, 1.0) for u in inputs])
-    return again if again is not None and again.current.terms and again.is_whole(again.current) else state
+    again = _without(state, second)
+    return again if again is not None and again.is_whole(again.current) else state
+
+
+def _explains_only(state: State, second: Sequence[int]) -> bool:
+    """Whether most of what the causes explain lies before the ``second`` stroke of each record."""
+    gain = state.baseline.residual**2 - state.current.residual**2
+    bins = zip(state.problem.bins.number, second, strict=True)
+    first = np.unique(np.concatenate([number[:until] for number, until in bins]))
+    return float(gain[first[first >= 0]].sum()) > LIMITS.first_stroke_share * max(float(gain.sum()), 0.0)
 
 
 def _without(state: State, counts: Sequence[int]) -> State | None:
