@@ -15,7 +15,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | None:
-    """Return the input through which all branches pass at one output, None where there is none.
+    """Return the input within the range through which all branches pass at one output; None: there is none.
 
     ``level`` (n,) is the input in units of its range, ``noise`` the rms noise of the output's samples.
     """
@@ -28,6 +28,8 @@ def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | N
         width[k] = np.sqrt(max(float(np.mean((y - slope * u) ** 2)) - noise**2, 0.0))
     told = np.bincount(number, minlength=width.size) >= LIMITS.least_moving
     beside = np.minimum(np.maximum.accumulate(width), np.maximum.accumulate(width[::-1])[::-1])
+    inside = np.arange(width.size) + 0.5  # at the tips every loop closes
+    told &= np.minimum(inside, width.size - inside) > LIMITS.pinch_inside * width.size
     wide = told & (beside > LIMITS.pinch_beside * float(np.ptp(output)))
     ratio = np.where(wide, width / np.maximum(beside, LIMITS.rounding), 1.0)
     k = int(np.argmin(ratio))

@@ -232,6 +232,7 @@ class Thresholds:
     # A pinched loop
     pinch_groups: int = 51  # of the input's range: in each the distance between the branches is measured
     pinch: float = 0.15  # of the distance on both sides: drawn memristors reach 0.09, others 0.45 or more
+    pinch_inside: float = 0.1  # of the input's range: nearer to an end than that is the tip of the loop
     pinch_near: float = 1.5  # of those groups, on either side of the point: whether branches cross there
     pinch_beside: float = 0.02  # of the span, rms: what is narrower than this on both sides is no loop
 

@@ -11,7 +11,7 @@ from matplotlib.ticker import NullFormatter, StrMethodFormatter
 from pulsetrainer.artefacts import Cause, Dependence, Diagnosis, FloatArray, Profile
 from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.report import panels
-from pulsetrainer.report.diagnosis_text import answer, explains, in_doubt
+from pulsetrainer.report.diagnosis_text import answer, beside, explains, in_doubt
 from pulsetrainer.report.style import (
     BLUE,
     COLUMN_IN,
@@ -44,10 +44,12 @@ def course(found: Diagnosis) -> Figure:
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
-    causes = [one.cause for one in found.found]
-    verdict = ", ".join(causes) if found.verdict in causes else found.verdict
+    sure, doubted = beside(found)
+    named = found.verdict in [one.cause for one in found.found]
+    verdict = ", ".join([found.verdict, *sure]) if named else found.verdict
     how = " (quick screen)" if found.quick else " (in doubt)" if in_doubt(found) else ""
-    above.set_title(f"Verdict: {verdict}{how}", wrap=True)
+    more = f"; in doubt: {', '.join(doubted)}" if named and doubted else ""
+    above.set_title(f"Verdict: {verdict}{how}{more}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="without causes")
     if found.extended_percent < found.static_percent:

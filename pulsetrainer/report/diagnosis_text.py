@@ -76,6 +76,14 @@ def in_doubt(found: Diagnosis) -> bool:
     return any(one.cause == found.verdict and bool(one.doubts) for one in found.found)
 
 
+def beside(found: Diagnosis) -> tuple[list[str], list[str]]:
+    """Return what else was found, each once: without doubt, and where the verdict is sure, in doubt."""
+    others = [one for one in found.found if one.cause != found.verdict]
+    doubted = [] if in_doubt(found) else [one.cause for one in others if one.doubts]
+    sure = [one.cause for one in others if one.cause not in doubted]
+    return list(dict.fromkeys(sure)), list(dict.fromkeys(doubted))
+
+
 def unnamed(found: Diagnosis) -> str:
     """Return the strongest cause that noise alone hardly looks like, where none was found; else nothing."""
     if found.verdict not in ("none", "inconclusive") or found.found:

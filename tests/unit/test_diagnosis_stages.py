@@ -1481,6 +1481,10 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
             {"verdict": "step", "findings": (_finding("step", 20.0), _finding("creep", 9.0))},
             "correct, extend",
         ),
+        (
+            {"verdict": "step", "findings": (_finding("step", 20.0), _finding("creep", 9.0, doubts=("x",)))},
+            "correct",
+        ),
         ({"verdict": "step", "findings": (_finding("step", 20.0),), "lacks": ("rates",)}, "correct"),
         ({"verdict": "creep", "lacks": ("rates",)}, "lacks"),
         ({"verdict": "creep", "lacks": ("rates",), "extended": "a model"}, "extend"),

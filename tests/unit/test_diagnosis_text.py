@@ -213,6 +213,19 @@ def test_the_figure_bears_the_verdict_of_the_page(verdict):
     assert course(found).axes[0].get_title("left") == f"Verdict: {verdict}"
 
 
+@pytest.mark.parametrize("doubts", [(), ("it fits, but does not repeat",)])
+def test_what_is_in_doubt_beside_the_verdict_is_not_called_found(doubts):
+    """The headline and the figure named both alike, where the terminal said that one is in doubt."""
+    step, creep = (
+        replace(_cause(0.0, found=True), cause="step"),
+        replace(_cause(0.0, found=True), doubts=doubts),
+    )
+    found = replace(store_examples.diagnosis(), causes=(step, creep), verdict="step")
+    between = "; in doubt: " if doubts else ", "
+    assert headline(found).startswith(f"Found: step{between}creep")
+    assert course(found).axes[0].get_title("left") == f"Verdict: step{between}creep"
+
+
 def test_what_the_model_contains_already_is_told_first():
     """A verdict of creep, of a model with creep, read like a fault of that model."""
     found = replace(store_examples.diagnosis(), causes=(_cause(0.0, found=True),), verdict="creep")

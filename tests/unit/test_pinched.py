@@ -50,6 +50,17 @@ def test_other_loops_are_not_pinched(device):
     assert pinched_at((u + 1.0) / 2.0, y + noise, 1e-3) is None
 
 
+@pytest.mark.parametrize(
+    ("at", "inside"), [(0.03, False), (0.09, False), (0.11, True), (0.89, True), (0.97, False)]
+)
+def test_the_tip_of_a_loop_is_no_such_point(at, inside):
+    """Every loop closes there: a device that wandered was told to be a memristor at 3 % of its range."""
+    level = np.tile(np.concatenate([np.linspace(0.0, 1.0, 2000), np.linspace(1.0, 0.0, 2000)]), 3)
+    branch = np.sign(np.gradient(level))
+    found = pinched_at(level, level + 0.05 * branch * (np.abs(level - at) > 0.012), 0.0)
+    assert found == (pytest.approx(at, abs=0.01) if inside else None)
+
+
 def test_a_butterfly_crosses_itself():
     """A strain that goes with the square of what lags: it was called a memristor."""
     time, u = _sines()

@@ -106,7 +106,7 @@ def _after_verdict(state: State) -> Evidence:
         kind = "lacks" if state.lacks and state.verdict == "unknown" else state.verdict
         return Evidence(kind, names=state.lacks)
     if state.verdict in state.correctable:
-        device = any(one.found and one.cause.lasting for one in state.findings)
+        device = any(one.found and one.cause.lasting and not one.in_doubt for one in state.findings)
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
     # no recording in the model's range would show more
     lacks = state.lacks if state.verdict != OutOfRange.id else ()
