@@ -3,7 +3,8 @@
 If the model as given is of the wrong kind, or of another condition, that comes first: another model is
 needed. If the device was still settling when the records began, it must rest first. If the model contains
 what was found already, it is used as it is. If causes are tied, the advice is the experiment on which they
-look least alike, simulated with the model that was found. Otherwise it is what the verdict asks for: a fault
+look least alike, simulated with the model that was found. If what was found is as quick as the samples, a
+record as much faster is advised. Otherwise it is what the verdict asks for: a fault
 of the measurement is taken out of the record (`correct`), a property of the device goes into the model
 (`extend`). What the records lack comes after what can be done with them; it comes first if that is nothing.
 """
@@ -19,7 +20,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.experiment import best_experiment
+from pulsetrainer.diagnosis.experiment import best_experiment, factors_for, quick_of
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -41,6 +42,11 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 def stage(state: State) -> State:
     """Return the state with its advice."""
     advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
+    quick = quick_of(state)
+    if quick is not None and "faster" not in advice.figures and state.question.timed:
+        step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
+        figures = {"tau": quick, "apart": step, "faster": factors_for(state)[0]}
+        advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
 
 

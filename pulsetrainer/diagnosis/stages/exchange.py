@@ -1,7 +1,8 @@
 """Exchange: each cause against the others of its family, its own other kinds, and its finer formula.
 
 When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
-every other variant of its own is fitted in its place, and the best is kept. The new one inherits the p-value
+every other variant of its own is fitted in its place, and the best is kept. Of a lag, or a force by speed, as
+quick as the samples, a creep is tried too, and of such a creep the lags. The new one inherits the p-value
 of the old: the test was whether anything of this family is there, not which one (decision 044). A formula
 with one more parameter takes the place of its own only where neither noise nor what happens between two
 samples can make the difference, twice over.
@@ -18,6 +19,7 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.quick import as_late
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
@@ -64,12 +66,13 @@ def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
     kinds = other_kinds(cause, problem.frames[0])
-    if not kin and not kinds:
-        return state
     # by its cause: an exchange before this one has moved all terms
     term = next(term for term in current.terms if term.cause is cause)
+    late = [one for one in as_late(term, problem.frames[0]) if one.cause.id not in current.names]
+    if not kin and not kinds and not late:
+        return state
     without = current.without(term)
-    others = [Term(kind, term.values) for kind in kinds]
+    others = late + [Term(kind, term.values) for kind in kinds]
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
