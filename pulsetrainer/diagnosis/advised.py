@@ -54,8 +54,8 @@ ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
         "To tell {names} apart, record {experiment}{often}{lasting}. There the two most similar causes "
-        "differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ "
-        "by {here:.2g} %. Then diagnose that recording.{command}"
+        "differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they "
+        "differ by {here:.2g} %. Then diagnose that recording.{command}"
     ),
     "tied, no better": (
         "We know of no kind of recording that would tell {names} apart much better than this one, on which "

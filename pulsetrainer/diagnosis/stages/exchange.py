@@ -10,6 +10,7 @@ samples can make the difference, twice over.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
@@ -62,6 +63,12 @@ def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
     return not may_be_nothing(cause.strengths_of(known))
 
 
+def _told_apart(state: State, trials: Sequence[Fitted]) -> list[Fitted]:
+    """Return the fits whose squares are lower than neither noise nor what lies between samples can make."""
+    noise, squares = state.scores.noise, state.current.squares
+    return [one for one in trials if squares - one.squares > doubt(state.current, one, noise)]
+
+
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
@@ -72,10 +79,11 @@ def _exchanged(state: State, cause: Cause) -> State:
     if not kin and not kinds and not late:
         return state
     without = current.without(term)
-    others = late + [Term(kind, term.values) for kind in kinds]
+    others = [Term(kind, term.values) for kind in kinds]
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
+    trials += _told_apart(state, [refit(problem, (*without.terms, one), without) for one in late])
     best = min((current, *trials), key=lambda fitted: fitted.squares)
     if best is current:
         return state
