@@ -199,7 +199,7 @@ class Thresholds:
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
     rival_late: float = 0.5  # of what is left above the quick noise: as good, among lags
-    quick_steps: float = 4.0  # time steps: what is no slower is as quick as the samples ...
+    quick_steps: float = 5.0  # time steps: what is no slower is as quick as the samples ...
     quick_low: float = 1.1  # ... as is what comes so near to the shortest time that is searched
     quick_share: float = 0.4  # of the part at once: a creep as late as a lag is first tried with so much
     quick_stop: float = 5.0  # such times: by then all but 0.7 % has followed a step

@@ -2,10 +2,10 @@
 
 When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
 every other variant of its own is fitted in its place, and the best is kept. Of a lag, or a force by speed, as
-quick as the samples, a creep is tried too, and of such a creep the lags. The new one inherits the p-value
-of the old: the test was whether anything of this family is there, not which one (decision 044). A formula
-with one more parameter takes the place of its own only where neither noise nor what happens between two
-samples can make the difference, twice over.
+quick as the samples, a creep is tried too, of such a creep the lags, and one creep in the place of several
+(decision 128). The new one inherits the p-value of the old: the test was whether anything of this family is
+there, not which one (decision 044). A formula with one more parameter takes the place of its own only where
+neither noise nor what happens between two samples can make the difference, twice over.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import may_be_nothing
@@ -29,6 +30,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with each cause exchanged for a better one of its family, where there is one."""
+    state = _one_creep(state)
     for cause in [term.cause for term in state.current.terms]:
         state = _exchanged(state, cause)
     for term in state.current.terms:
@@ -61,6 +63,23 @@ def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
     known = estimates_of(fine, state.scores, state.held_out, state.floor)[name]
     (cause,) = (one.cause for one in fine.terms if one.cause.id == name)
     return not may_be_nothing(cause.strengths_of(known))
+
+
+def _one_creep(state: State) -> State:
+    """Return the state with one creep for several causes as quick as the samples, where that is as good."""
+    current, frame = state.current, state.problem.frames[0]
+    creeps = {term: as_late(term, frame) for term in current.terms if not isinstance(term.cause, Creep)}
+    several = [term for term, one in creeps.items() if one]
+    if len(several) == 1 or Creep.id in current.names or not several:
+        return state
+    others = tuple(term for term in current.terms if term not in several)
+    trials = [refit(state.problem, (*others, *creeps[term]), current) for term in several]
+    best = min(trials, key=lambda fitted: fitted.squares)
+    if best.squares - current.squares > doubt(current, best, state.scores.noise):
+        return state
+    p_values = {name: p for name, p in state.p_values.items() if name in best.names}
+    p_values[Creep.id] = min(state.p_values[term.cause.id] for term in several)
+    return replace(state, current=settled(state.problem, best), p_values=p_values)
 
 
 def _told_apart(state: State, trials: Sequence[Fitted]) -> list[Fitted]:
