@@ -235,7 +235,7 @@ class Bench:
         }
         columns = (("time", "s"), (self.input, self.unit), (self.output, self.unit_of_output))
         shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
-        shares["centre"] = 0.5 * (min(experiment.TURNS) + max(experiment.TURNS))
+        shares["centre"] = 0.5 * sum(experiment.TURNS[-2:])
         return {
             "input": self.input,
             "output": self.output,
