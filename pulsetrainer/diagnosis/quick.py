@@ -45,10 +45,11 @@ def _creep(amplitude: float, tau: float, frame: Frame) -> Term:
     return Term(cause, (amplitude, min(max(tau, bound.low), bound.high)))
 
 
-def beside_quick_creep(term: Term, terms: Sequence[Term], frame: Frame) -> bool:
-    """Return whether a cause is as quick as the samples, beside a creep that is, whose formula errs."""
-    creeps = [one for one in terms if isinstance(one.cause, Creep) and one is not term]
-    return all(quick_s(one, frame) is not None for one in (term, *creeps)) and bool(creeps)
+def beside_fast_creep(term: Term, terms: Sequence[Term], frame: Frame) -> bool:
+    """Return whether a cause is as quick as the samples, beside a creep faster than any that is tried."""
+    fastest = LIMITS.quick_low * Creep.parameters[1].low
+    creep = any(isinstance(one.cause, Creep) and one.values[1] <= fastest for one in terms if one is not term)
+    return creep and quick_s(term, frame) is not None
 
 
 def times_of(terms: Sequence[Term], frame: Frame) -> list[float]:

@@ -1245,3 +1245,15 @@ def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
         rates=lambda fitted, _: np.zeros(4 if fitted is before else 0),
     )
     assert repeats.repeated(told, before, after) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("tau", "late", "found"), [(0.03, 0.02, True), (0.1, 0.02, False), (0.03, 0.2, False)]
+)
+def test_what_is_quick_beside_a_fast_creep_may_be_what_its_formula_misses(tau, late, found):
+    """Only beside a creep faster than 0.04 of the second, from which creep is sought; no creep beside itself."""
+    frame = Frame(0.01, np.zeros(3000), 1.0, 1.0)
+    creep, lag = Term(CAUSE["creep"], (0.3, tau)), Term(CAUSE["output-lag"], (late,))
+    assert quick.beside_fast_creep(lag, (creep, lag), frame) is found
+    assert not quick.beside_fast_creep(creep, (creep, lag), frame)
+    assert not quick.beside_fast_creep(lag, (lag,), frame)

@@ -2,9 +2,9 @@
 
 Each cause is taken out of the full model in turn. As long as the least important one makes no relevant
 difference, or less than a five hundredth of that of all together (the formulas of the others are not that
-exact), it is dropped. Beside a creep as quick as the samples, another cause as quick must make 8 % of it. A
-cause is also dropped if time that was left out is predicted better without it: it was accepted before the
-others, and does harm beside them. The same holds if it takes away less than a third
+exact), it is dropped. Beside a creep faster than any that is tried, a cause as quick as the samples must make 8
+% of it. A cause is also dropped if time that was left out is predicted better without it: it was accepted
+before the others, and does harm beside them. The same holds if it takes away less than a third
 of what can be lowered on blocks that were left out, while more than noise is left with it or without it: any
 cause fits a device that is not a Preisach operator. A line of the spectrum that is most of what is left
 without it is not dropped for this: no error of a model looks like that, however badly blocks that were left
@@ -21,7 +21,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.fitting import Fitted
-from pulsetrainer.diagnosis.quick import beside_quick_creep
+from pulsetrainer.diagnosis.quick import beside_fast_creep
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -52,7 +52,7 @@ def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
 def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
     """The one of the models with one cause less that is no worse; None where all of them are."""
     of_all, frame = state.baseline.squares - current.squares, state.problem.frames[0]
-    missed = [beside_quick_creep(term, current.terms, frame) for term in current.terms]
+    missed = [beside_fast_creep(term, current.terms, frame) for term in current.terms]
     least = [LIMITS.imperfect if one else LIMITS.least_share for one in missed]
     spare = [
         fewer
