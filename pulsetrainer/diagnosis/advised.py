@@ -42,19 +42,25 @@ RATE = (
     "If the samples were taken at a constant rate, no new recording is needed: read the table again with "
     "pulsetrainer import --rate HZ."
 )
+# of what is found at the fast end of what a record shows
+QUICK = (
+    " A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart). "
+    "To know what it is, record {experiment}{often}{lasting}. Then diagnose that recording.{command}"
+)
+_NOTHING_ELSE = ("lacks", "again")  # advice that a faster record takes the place of
 # after what can be done with the records as they are
 LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
 ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
-        "To tell {names} apart, record {experiment}{lasting}. There the two most similar causes differ by "
-        "{there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ "
-        "by {here:.2g} %. Then diagnose that recording.{command}"
+        "To tell {names} apart, record {experiment}{often}{lasting}. There the two most similar causes "
+        "differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they "
+        "differ by {here:.2g} %. Then diagnose that recording.{command}"
     ),
     "tied, no better": (
         "We know of no kind of recording that would tell {names} apart much better than this one, on which "
         "they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of "
-        "the same kind would help, as noise averages out."
+        "the same kind would help: four times as long halves the noise."
     ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
@@ -123,7 +129,7 @@ ADVICE: Mapping[str, str] = {
     ),
     "again": (
         "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
-        "model. Record again, and diagnose both recordings together."
+        "model. Record the same again, and diagnose both recordings together."
     ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
@@ -150,8 +156,8 @@ ADVICE: Mapping[str, str] = {
     ),
     "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
     "strokes": (
-        "Record again in the same condition, at least three times over the whole range and with smaller "
-        "loops, and diagnose that."
+        "Record again in the same condition, at least three times between {low} and {high}, then with "
+        "smaller loops that turn at {turns}, and diagnose that."
     ),
     "identify anew": (
         "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
@@ -163,6 +169,7 @@ ADVICE: Mapping[str, str] = {
         "a Preisach model may not describe this device."
     ),
 }
+_TIMES = ("rest", "tau", "apart")  # figures that are times
 _TIED = ("tied", "tied, no better")
 _SAYS_CORRECT = ("correct", "correct, extend", "extend, correct", "extend, or late", "none, correct")
 OURS = (
@@ -178,17 +185,20 @@ MISSING: Mapping[str, str] = {
     "rates": "the same loops at {slow}, {middle} and {fast}",
     "holds": "stops of {hold} at each of {levels}",
     "length": "{short} or more in all",
-    "time": "with the time of every sample, at several rates and with rests",
+    "time": (
+        "with the time of every sample, the same loops at {slow}, {middle} and {fast}, and stops of {hold} "
+        "at each of {levels}"
+    ),
 }
 EXPERIMENTS: Mapping[str, str] = {
     "nested loops": (
-        "loops of the {input} between {low} and {high}, ever smaller, once each at {slow}, {middle}, {quick} "
-        "and {fast}"
+        "loops of the {input} between {low} and {high}, ever smaller about {centre} (turning at {turns}), "
+        "once each at {slow}, {middle}, {quick} and {fast}"
     ),
     "steps and holds": "steps of the {input} at {fast} to {levels}, with a stop of {hold} after each",
     "equal minor loops": (
-        "loops of the {input} at {pace} that are {width} wide, up from {biases}, each reached once from "
-        "below and once from above"
+        "loops of the {input} at {pace} that are {width} wide, two each up from {biases}, reached once from "
+        "{low} and once from {high}"
     ),
     "equal cycles": (
         "twenty equal cycles of the {input} between {bottom} and {top} at {middle}, and twenty at {quick}"
@@ -225,6 +235,7 @@ class Bench:
         }
         columns = (("time", "s"), (self.input, self.unit), (self.output, self.unit_of_output))
         shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
+        shares["centre"] = 0.5 * sum(experiment.TURNS[-2:])
         return {
             "input": self.input,
             "output": self.output,
@@ -237,6 +248,7 @@ class Bench:
             ),
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
+            "turns": self._levels(experiment.TURNS),
             "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
             **{name: self._rate(faster * one) for name, one in rates.items()},
             **{name: self.time(one / faster) for name, one in times.items()},
@@ -245,6 +257,11 @@ class Bench:
     def lasting(self, name: str, faster: float) -> str:
         """Return how long an experiment takes, as the end of a phrase."""
         return f", about {self.time(experiment.length_s(name) / faster)} in all" if self.timed else ""
+
+    def often(self, name: str, faster: float) -> str:
+        """Return how often an experiment must be sampled, as the end of a phrase."""
+        every = self.time(experiment.sampled_s(name) / faster) if self.timed else ""
+        return f", sampled at least every {every}" if every and not self.ours else ""
 
     def _levels(self, shares: Sequence[float]) -> str:
         *rest, last = [self._number(share) for share in shares]
@@ -280,6 +297,8 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     faster = one.figures.get("faster", 1.0)
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
+    quick = "tau" in one.figures and not bench.ours  # our device plays no faster signal
+    played = one.names[0] if tied else "steps and holds"
     names = one.names[1:] if tied else one.names
     lacked = [name for name in names if name in LACKS]
     faults = [name for name in names if name not in LACKS and library()[name].corrects]
@@ -288,20 +307,24 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         told = (MAINS if "mains" in one.figures else "") + begins + ADVICE[one.kind]
         told += KNOWN if 0 < len(faults) < len(names) else ""
     else:
-        told = ADVICE[one.kind] + (ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else "")
-    return _with_what_lacks(told, lacked).format(
+        told = "" if quick and one.kind in _NOTHING_ELSE else ADVICE[one.kind]
+        told += ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else ""
+    told = told + QUICK if quick else _with_what_lacks(told, lacked)
+    said = told.format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
-        lacked=listed(lacked, numbers),
+        lacked=listed(lacked, bench.numbers()),
         either=" or ".join(names),
         removed=listed(removed, numbers),
         faults=listed(faults, numbers),
-        experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
-        lasting=bench.lasting(one.names[0], faster) if tied else "",
+        experiment=EXPERIMENTS[played].format(**numbers),
+        often=bench.often(played, faster),
+        lasting=bench.lasting(played, faster),
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
         command=(OURS if bench.ours else TABLE).format(**numbers),
-        **{name: bench.time(value) if name == "rest" else value for name, value in one.figures.items()},
+        **{name: bench.time(value) if name in _TIMES else value for name, value in one.figures.items()},
     )
+    return said.lstrip()
 
 
 def _with_what_lacks(told: str, lacked: Sequence[str]) -> str:

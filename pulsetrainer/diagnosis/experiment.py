@@ -21,6 +21,7 @@ from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Simulator
 from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.quick import as_late, times_of
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
@@ -34,8 +35,12 @@ CYCLE = (0.8, 0.2)
 _CYCLES = (0.0, *CYCLE * 20, 0.0)
 _CYCLE_RATES = (1.5, 4.0)
 HEATING_S = 30.0
+TURNS = _NESTED[1:-1]
+SAMPLED_S = 1.0 / 160.0  # twenty samples in a range at the highest rate ...
+SAMPLED_AT_REST_S = 0.05  # ... and where the rests tell
+_RESTS = ("steps and holds", "heating")
 PACE = 1.0  # of minor loops, and of those around the heating
-FASTER = (1.0, 4.0)  # a slow record may hide what is quicker than its own second
+_FASTER = (1.0, 4.0)  # a slow record may hide what is quicker than its own second
 
 
 @dataclass(frozen=True)
@@ -55,13 +60,31 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     here = _smallest_distance(state, state.problem, terms, others)
     plane = state.problem.plane
     found = []
-    for (name, shares), faster in product(_experiments().items(), FASTER):
+    for (name, shares), faster in product(_experiments().items(), factors_for(state)):
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.static(u)
         record = Record(u, y, dt_s=1.0 / (faster * LIMITS.experiment_Hz))
         problem = state.problem.of([record])
         found.append(Experiment(name, _smallest_distance(state, problem, terms, others), here, faster))
     return max(found, key=lambda one: one.distance)
+
+
+def quick_of(state: State) -> float | None:
+    """Return the shortest time of what was found, s of the records, where it is as quick as the samples."""
+    found = [one.cause.id for one in state.findings if one.found]
+    known = [term for term in state.current.terms if term.cause.id in found]
+    return min(times_of(known, state.problem.frames[0]), default=None)
+
+
+def factors_for(state: State) -> tuple[float, ...]:
+    """Return how many times faster experiments may be: as fast as what was found, if that is quick."""
+    quick = quick_of(state)
+    return _FASTER if quick is None else (max(1.0, HOLD_S / (LIMITS.quick_stop * quick)),)
+
+
+def sampled_s(name: str) -> float:
+    """Return the longest time between two samples of an experiment, s, at the rates of ``RATES``."""
+    return SAMPLED_AT_REST_S if name in _RESTS else SAMPLED_S
 
 
 def length_s(name: str) -> float:
@@ -103,7 +126,11 @@ def _term(state: State, name: str) -> Term:
     for term in state.current.terms:
         if term.cause.id == name:
             return term
-    cause = library()[name]
+    frame, cause = state.problem.frames[0], library()[name]
+    for term in state.current.terms:
+        for other in as_late(term, frame):
+            if other.cause.id == name:
+                return other
     parts = [state.problem.bins.even(state.baseline.residual, k) for k in range(len(state.problem.records))]
     starts = [Term(cause, block[0]) for block in cause.starts(state.problem.frames, parts)]
     simulator = state.baseline.simulator

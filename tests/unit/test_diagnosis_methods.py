@@ -22,6 +22,7 @@ from pulsetrainer.diagnosis import (
     floor,
     intervals,
     question,
+    quick,
     repeats,
     residual,
     screening,
@@ -887,13 +888,76 @@ def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     assert " V" in said
     assert " A" not in said
     told = {
-        "nested loops": ["between 20 V and 120 V", "25000 V/s", "400000 V/s", "about 34.1 ms in all"],
+        "nested loops": [
+            "about 70 V (turning at 120, 30, 110, 40, 100, 50 and 90 V)",
+            "25000 V/s",
+            "400000 V/s",
+            "about 34.1 ms in all",
+        ],
         "steps and holds": ["110, 50, 90 and 30 V", "6 ms"],
-        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V", "50000 V/s"],
+        "equal minor loops": [
+            "15 V wide",
+            "two each up from 30, 50, 70 and 90 V",
+            "50000 V/s",
+            "once from 120 V",
+        ],
         "equal cycles": ["between 40 V and 100 V", "75000 V/s"],
         "heating": ["60 ms at 120 V", "60 ms at 20 V", "about 136 ms in all"],
     }
     assert [words for words in told[name] if words not in said] == []
+    often = "100 µs" if name in ("steps and holds", "heating") else "12.5 µs"
+    assert f"sampled at least every {often}" in said
+
+
+@pytest.mark.parametrize("kind", ["lacks", "again", "extend", "correct"])
+def test_what_is_as_quick_as_the_samples_asks_for_a_faster_recording(kind):
+    """Ten hours, every 10 s: creep of 25 s was followed by stops of hours. Our device has one signal only."""
+    figures = {"tau": 25.0 / 7700.0, "apart": 10.0 / 7700.0, "faster": 0.6 * 7700.0 / 25.0}
+    one = Evidence(kind, figures=figures, names=("holds",))
+    said = advised.advice(one, advised.Bench(Scale(2.0, 6.0, second=7700.0), "V"))
+    for words in ("about 25 s was found", "samples 10 s apart", "a stop of 125 s", "every 2.08 s"):
+        assert words in said, said
+    assert " h " not in said
+    assert (kind in ("lacks", "again")) is said.startswith("A time of")
+    assert "A time of" not in advised.advice(one, advised.Bench(Scale(), "A", ours=True))
+
+
+def _quick(name, *values, dt_s=0.01, length=3000):
+    """A cause with its values, on a record with so many samples."""
+    frame = Frame(dt_s, np.zeros(length), 1.0, 1.0)
+    term = Term(library()[name], values)
+    return quick.quick_s(term, frame), quick.as_late(term, frame)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "tau"),
+    [
+        ("output-lag", (0.05,), 0.05),
+        ("output-lag", (0.051,), None),
+        ("field-lag", (0.002,), 0.01),  # nothing shorter than a step is known
+        ("delay", (0.02,), 0.02),
+        ("creep", (0.3, 0.03), 0.03),
+        ("creep", (0.3, 0.2), None),
+        ("thermal-drift", (0.1, 0.3), 0.3),  # a hundredth of the record, the shortest that is searched
+        ("thermal-drift", (0.1, 3.0), None),
+        ("step", (0.1, 0.1, 0.01), None),  # a moment is no time constant
+        ("resonance", (5.0, 0.1), None),
+    ],
+)
+def test_what_is_as_quick_as_the_samples(name, values, tau):
+    """At most five time steps, or at the short end of what is searched."""
+    found, others = _quick(name, *values)
+    assert found == tau
+    named = {one.cause.id for one in others}
+    if name == "creep" and tau is not None:
+        assert named == {"delay", "field-lag", "output-lag"}
+        assert [one.values[0] for one in others] == pytest.approx([0.3 / 1.3 * 0.03] * 3)
+    elif tau is not None and name != "thermal-drift":
+        (creep,) = others
+        amplitude, slow = creep.values
+        assert amplitude / (1.0 + amplitude) * slow == pytest.approx(max(values[0], 0.01 * 2.0 / 7.0))
+    else:
+        assert named == set()
 
 
 def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
@@ -1181,3 +1245,15 @@ def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
         rates=lambda fitted, _: np.zeros(4 if fitted is before else 0),
     )
     assert repeats.repeated(told, before, after) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("tau", "late", "found"), [(0.03, 0.02, True), (0.1, 0.02, False), (0.03, 0.2, False)]
+)
+def test_what_is_quick_beside_a_fast_creep_may_be_what_its_formula_misses(tau, late, found):
+    """Only beside a creep faster than 0.04 of the second, from which it is sought; none beside itself."""
+    frame = Frame(0.01, np.zeros(3000), 1.0, 1.0)
+    creep, lag = Term(CAUSE["creep"], (0.3, tau)), Term(CAUSE["output-lag"], (late,))
+    assert quick.beside_fast_creep(lag, (creep, lag), frame) is found
+    assert not quick.beside_fast_creep(creep, (creep, lag), frame)
+    assert not quick.beside_fast_creep(lag, (lag,), frame)

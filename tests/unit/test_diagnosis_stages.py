@@ -978,9 +978,10 @@ def _rivals(
     lacks=(),
     scores=("delay",),
     name="field-lag",
+    creep=9999.0,
     **more,
 ):
-    fits = {frozenset({one}): squares for one in scores}
+    fits = {frozenset({"creep"}): creep} | {frozenset({one}): squares for one in scores}
     asked = _refitting(monkeypatch, rivals, squares=fits)
     monkeypatch.setattr(rivals, "ranked", lambda *_fits: tuple(_score(one, gain) for one in scores))
     without = {name: _fit(current + 400.0)}
@@ -1025,11 +1026,17 @@ def test_what_scores_less_than_half_is_no_rival(monkeypatch, gain, found):
 def test_a_rival_of_a_large_gain_may_be_a_little_worse(monkeypatch):
     """A two hundredth of the gain, where that is more than the noise."""
     for squares, found in ((50.9, ("delay",)), (51.1, ())):
-        fits = {frozenset({"delay"}): squares}
+        fits = {frozenset({"delay"}): squares, frozenset({"creep"}): 9999.0}
         _refitting(monkeypatch, rivals, squares=fits)
         monkeypatch.setattr(rivals, "ranked", lambda *_fits: (_score("delay", 6000.0),))
         state = _state(_fit(1.0, "field-lag"), without={"field-lag": _fit(10_001.0)})
         assert rivals.rivals(state, state.current.terms[0]) == found
+
+
+@pytest.mark.parametrize(("creep", "found"), [(549.0, ("creep",)), (551.0, ())])
+def test_a_lag_as_quick_as_the_samples_may_be_a_creep(monkeypatch, creep, found):
+    """Half a time step late: creep is asked about whatever it scored, and told as lags are."""
+    assert _rivals(monkeypatch, 9999.0, creep=creep)[0] == found
 
 
 def test_only_the_closest_three_are_tried(monkeypatch):

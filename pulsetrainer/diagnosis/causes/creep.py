@@ -59,7 +59,8 @@ class Creep(OfKinds):
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         strength, tau = self.parameters
-        return strength, replace(tau, high=max(_BOUND * frame.length_s, 2.0 * tau.low))
+        low = min(tau.low, frame.dt_s)
+        return strength, replace(tau, low=low, high=max(_BOUND * frame.length_s, 2.0 * tau.low))
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         length = frames[0].length_s

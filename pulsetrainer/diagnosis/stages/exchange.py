@@ -4,21 +4,27 @@ When a cause was chosen, others were still missing. So each cause is taken out, 
 family, and every other kind of its own, is fitted in its place. The best is kept. A new cause inherits the
 p-value of the old one: the test was whether anything of this family is there, not which one (decision 044).
 
+For a lag or a force by speed that is as quick as the samples a creep is tried as well, for such a creep the
+lags, and one creep in the place of several quick causes (decision 128).
+
 Some causes have a finer formula with one more parameter. It takes the place of the plain one only if the fits
 differ by more than twice what noise, and what happens between two samples, can make.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.quick import as_late
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
@@ -27,6 +33,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with each cause exchanged for a better one of its family, where there is one."""
+    state = _one_creep(state)
     for cause in [term.cause for term in state.current.terms]:
         state = _exchanged(state, cause)
     for term in state.current.terms:
@@ -61,19 +68,44 @@ def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
     return not may_be_nothing(cause.strengths_of(known))
 
 
+def _one_creep(state: State) -> State:
+    """Return the state with one creep for several causes as quick as the samples, where that is as good."""
+    current, frame = state.current, state.problem.frames[0]
+    creeps = {term: as_late(term, frame) for term in current.terms if not isinstance(term.cause, Creep)}
+    several = [term for term, one in creeps.items() if one]
+    if len(several) == 1 or Creep.id in current.names or not several:
+        return state
+    others = tuple(term for term in current.terms if term not in several)
+    trials = [refit(state.problem, (*others, *creeps[term]), current) for term in several]
+    best = min(trials, key=lambda fitted: fitted.squares)
+    if best.squares - current.squares > doubt(current, best, state.scores.noise):
+        return state
+    p_values = {name: p for name, p in state.p_values.items() if name in best.names}
+    p_values[Creep.id] = min(state.p_values[term.cause.id] for term in several)
+    return replace(state, current=settled(state.problem, best), p_values=p_values)
+
+
+def _told_apart(state: State, trials: Sequence[Fitted]) -> list[Fitted]:
+    """Return the fits whose squares are lower than neither noise nor what lies between samples can make."""
+    noise, squares = state.scores.noise, state.current.squares
+    return [one for one in trials if squares - one.squares > doubt(state.current, one, noise)]
+
+
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
     kinds = other_kinds(cause, problem.frames[0])
-    if not kin and not kinds:
-        return state
     # by its cause: an exchange before this one has moved all terms
     term = next(term for term in current.terms if term.cause is cause)
+    late = [one for one in as_late(term, problem.frames[0]) if one.cause.id not in current.names]
+    if not kin and not kinds and not late:
+        return state
     without = current.without(term)
     others = [Term(kind, term.values) for kind in kinds]
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
+    trials += _told_apart(state, [refit(problem, (*without.terms, one), without) for one in late])
     best = min((current, *trials), key=lambda fitted: fitted.squares)
     if best is current:
         return state

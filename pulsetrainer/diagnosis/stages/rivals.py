@@ -3,8 +3,9 @@
 A name is unique only if no other cause fits as well in its place. The three causes that score best without it
 are fitted jointly, each in its place. A rival is named beside the cause found if noise, or what happens
 between two samples, could make the difference between the two fits. On a record of one single rate all causes
-that widen the loop with the rate are named together: there they are just a wider loop. Causes that equal
-loops showed have no rivals here: nothing else that is known makes equal loops differ.
+that widen the loop with the rate are named together: there they are just a wider loop. A creep and a lag as
+quick as the samples are tried in each other's place, whatever they score. Causes that equal loops showed have
+no rivals here: nothing else that is known makes equal loops differ.
 
 What speaks against a cause that was found is written beside it:
 
@@ -43,6 +44,7 @@ from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.quick import as_late
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -191,6 +193,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
 
     Lags in different places of the chain differ little. One also counts as good if it is behind by no more
     than a share of what is left above the noise from sample to sample: that may be the model's own error.
+    The same goes for a creep as quick as the samples.
     """
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares
@@ -205,12 +208,17 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     close = [score for score in others[: LIMITS.closest] if score.gain >= LIMITS.rival_screened * gain]
     # linearised from afar, a lag of another kind may score nothing
     close += [score for score in others if both_late(score, term) and score not in close]
-    for score in close:
-        terms = (*without.terms, in_place(term, score))
-        near = max(margin, LIMITS.rival_late * structure) if both_late(score, term) else margin
+    late = max(margin, LIMITS.rival_late * structure)
+    tried = [(in_place(term, score), late if both_late(score, term) else margin) for score in close]
+    quick = [one for one in as_late(term, state.problem.frames[0]) if one.cause.id not in fitted.names]
+    tried += [(one, late) for one in quick]
+    for one, near in tried:
+        if one.cause.id in found:
+            continue
+        terms = (*without.terms, one)
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + near)
         if trial.squares - fitted.squares < max(near, doubt(fitted, trial, state.scores.noise)):
-            found.append(score.cause.id)
+            found.append(one.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
         found += [name for name in alike if name not in (*found, *fitted.names)]
