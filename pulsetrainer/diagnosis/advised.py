@@ -298,7 +298,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
     quick = "tau" in one.figures and not bench.ours  # our device plays no faster signal
-    played = one.names[0] if tied else "steps and holds"
+    played = one.names[0] if tied else "nested loops"
     names = one.names[1:] if tied else one.names
     lacked = [name for name in names if name in LACKS]
     faults = [name for name in names if name not in LACKS and library()[name].corrects]

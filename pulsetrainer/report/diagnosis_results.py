@@ -122,11 +122,12 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
     """Say what was taken out of a run."""
     masked = int((~made.counts).sum())
     payload = {"output": out, "corrected": made.corrected, "masked_samples": masked}
-    rows = {
-        "taken out": ", ".join(made.corrected),
-        "largest change": with_unit(f"{largest_change(measured, made):.3g}", made.output_unit),
-        "samples left out": f"{masked} of {made.output.size}",
-    }
+    change = largest_change(measured, made)
+    rows = {"taken out": ", ".join(made.corrected)}
+    if change or not masked:
+        rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit)
+    filled = ", filled in between their neighbours" if masked else ""
+    rows["samples left out"] = f"{masked} of {made.output.size}{filled}"
     return payload, f"{out}: corrected run", rows
 
 

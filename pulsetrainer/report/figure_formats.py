@@ -16,6 +16,8 @@ def figure_format(path: Path, what: str, *more: str) -> str:
     EndingError where it is none of them.
     """
     form = path.suffix.lower().lstrip(".")
+    if path.is_dir():  # which is told when it is looked at
+        return FORMATS[0]
     if form not in (*FORMATS, *more):
         known = [*FORMATS, *more]
         written_as = f"{what} is written as {', '.join(known[:-1])} or {known[-1]}"

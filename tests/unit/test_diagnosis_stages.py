@@ -1521,6 +1521,17 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
         assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}
 
 
+@pytest.mark.parametrize("doubts", [(), ("it fits, but does not repeat",)])
+def test_a_faster_recording_is_asked_for_only_where_a_quick_cause_is_in_doubt(monkeypatch, doubts):
+    """A delay of two samples that nothing else explains is known well enough."""
+    monkeypatch.setattr(advice, "quick_of", lambda state: 0.02)
+    monkeypatch.setattr(advice, "factors_for", lambda state: (8.0,))
+    problem = SimpleNamespace(**{**vars(PROBLEM), "frames": [Frame(0.01, np.zeros(9), 1.0, 1.0, averaged=4)]})
+    state = _state(_fit(1.0), findings=(_finding("delay", 90.0, doubts=doubts),), problem=problem)
+    figures = advice.stage(replace(state, lacks=("length",))).advice.figures
+    assert figures == ({"tau": 0.02, "apart": 0.0025, "faster": 8.0} if doubts else {})
+
+
 @pytest.mark.parametrize(("there", "kind"), [(0.00151, "tied"), (0.00149, "tied, no better")])
 def test_no_recording_is_asked_for_that_tells_less(monkeypatch, there, kind):
     """Of two causes that differ by 0.1 % of the span on this one."""

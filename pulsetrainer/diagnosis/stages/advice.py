@@ -7,7 +7,7 @@ The first of these that applies is the advice:
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
-- If what was found is as quick as the samples, a record that is as much faster is advised.
+- If a cause in doubt is as quick as the samples, a record that is as much faster is advised.
 - Otherwise it is what the verdict asks for: a fault of the measurement is taken out of the record
   (`correct`), a property of the device goes into the model (`extend`).
 
@@ -47,7 +47,7 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 def stage(state: State) -> State:
     """Return the state with its advice."""
     advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
-    quick = quick_of(state)
+    quick = quick_of(state) if any(one.found and one.in_doubt for one in state.findings) else None
     if quick is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
         figures = {"tau": quick, "apart": step, "faster": factors_for(state)[0]}
