@@ -159,6 +159,11 @@ ADVICE: Mapping[str, str] = {
         "Record again in the same condition, at least three times between {low} and {high}, then with "
         "smaller loops that turn at {turns}, and diagnose that."
     ),
+    "keep steady": (
+        "Something that is not in these recordings changes the device or the measurement slowly. Let device "
+        "and sensor warm up, keep room and supply as they are, look for draughts and loose plugs, and "
+        "record the same again. No other recording shows more before that."
+    ),
     "identify anew": (
         "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
         "with the new model."

@@ -17,6 +17,7 @@ from pulsetrainer.core.excitations import through
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Simulator
@@ -60,7 +61,9 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     here = _smallest_distance(state, state.problem, terms, others)
     plane = state.problem.plane
     found = []
-    for (name, shares), faster in product(_experiments().items(), factors_for(state)):
+    # lags look least alike in the shortest of records, which would tell nothing else
+    factors = (*_FASTER, as_fast_as_found(state)) if Creep.id in names else _FASTER
+    for (name, shares), faster in product(_experiments().items(), factors):
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.static(u)
         record = Record(u, y, dt_s=1.0 / (faster * LIMITS.experiment_Hz))
@@ -76,10 +79,10 @@ def quick_of(state: State) -> float | None:
     return min(times_of(known, state.problem.frames[0]), default=None)
 
 
-def factors_for(state: State) -> tuple[float, ...]:
-    """Return how many times faster experiments may be: as fast as what was found, if that is quick."""
+def as_fast_as_found(state: State) -> float:
+    """Return how many times faster an experiment must be to show what was found, if that is quick; else 1."""
     quick = quick_of(state)
-    return _FASTER if quick is None else (max(1.0, HOLD_S / (LIMITS.quick_stop * quick)),)
+    return 1.0 if quick is None else max(1.0, HOLD_S / (LIMITS.quick_stop * quick))
 
 
 def sampled_s(name: str) -> float:

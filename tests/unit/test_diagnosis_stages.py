@@ -1498,6 +1498,8 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"verdict": "none", "lacks": ("rates",)}, "none"),
         ({"verdict": "unknown", "lacks": ("rates",)}, "lacks"),
         ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),
+        ({"findings": (TIED,), "verdict": "unknown", "evidence": (Evidence("zero wanders"),)}, "keep steady"),
+        ({"findings": (TIED,), "verdict": "step", "evidence": (Evidence("zero wanders"),)}, "tied"),
         ({"findings": (replace(TIED, found=False),)}, "none"),
         ({"findings": (TIED,), "evidence": (Evidence("wrong kind"),)}, "other model"),
         ({"findings": (TIED,), "evidence": (Evidence("changed", "condition-change"),)}, "identify anew"),
@@ -1525,7 +1527,7 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
 def test_a_faster_recording_is_asked_for_only_where_a_quick_cause_is_in_doubt(monkeypatch, doubts):
     """A delay of two samples that nothing else explains is known well enough."""
     monkeypatch.setattr(advice, "quick_of", lambda state: 0.02)
-    monkeypatch.setattr(advice, "factors_for", lambda state: (8.0,))
+    monkeypatch.setattr(advice, "as_fast_as_found", lambda state: 8.0)
     problem = SimpleNamespace(**{**vars(PROBLEM), "frames": [Frame(0.01, np.zeros(9), 1.0, 1.0, averaged=4)]})
     state = _state(_fit(1.0), findings=(_finding("delay", 90.0, doubts=doubts),), problem=problem)
     figures = advice.stage(replace(state, lacks=("length",))).advice.figures

@@ -4,6 +4,7 @@ The first of these that applies is the advice:
 
 - If the model as given is of the wrong kind, or of another condition, another model is needed.
 - If the device was still settling when the records began, it must rest first.
+- If no verdict is reached and what is left follows time alone, device and sensor must be kept steady.
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
@@ -25,7 +26,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.experiment import best_experiment, factors_for, quick_of
+from pulsetrainer.diagnosis.experiment import as_fast_as_found, best_experiment, quick_of
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -50,7 +51,7 @@ def stage(state: State) -> State:
     quick = quick_of(state) if any(one.found and one.in_doubt for one in state.findings) else None
     if quick is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
-        figures = {"tau": quick, "apart": step, "faster": factors_for(state)[0]}
+        figures = {"tau": quick, "apart": step, "faster": as_fast_as_found(state)}
         advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
 
@@ -63,7 +64,8 @@ def _of_the_conditions(state: State) -> Evidence | None:
     began = [one for one in state.evidence if one.kind == "under way"]
     if began and state.extended is None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
-    return None
+    wanders = state.verdict == "unknown" and any(one.kind == "zero wanders" for one in state.evidence)
+    return Evidence("keep steady") if wanders else None
 
 
 def _not_as_given(state: State) -> Evidence | None:
