@@ -255,6 +255,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "bare holds none"),
     "a folder as a page": ("evaluate played.h5 --html bare", 2, "'bare' is a folder", "name a file in it"),
+    "a folder as a figure": ("plot run.h5 -o bare", 2, "'bare' is a folder", "name a file in it"),
     "one run twice": ("identify run.h5 run.h5 -o out.h5", 2, "run.h5 is named twice", "each file once"),
     "a quiz of one pulse": (
         *(
