@@ -43,7 +43,7 @@ RATE = (
     "pulsetrainer import --rate HZ."
 )
 # of what is found at the fast end of what a record shows
-QUICK = (
+FASTER = (
     " A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart). "
     "To know what it is, record {experiment}{often}{lasting}. Then diagnose that recording.{command}"
 )
@@ -302,7 +302,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     faster = one.figures.get("faster", 1.0)
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
-    quick = "tau" in one.figures and not bench.ours  # our device plays no faster signal
+    faster_too = "tau" in one.figures and not bench.ours  # our device plays no faster signal
     played = one.names[0] if tied else "nested loops"
     names = one.names[1:] if tied else one.names
     lacked = [name for name in names if name in LACKS]
@@ -312,9 +312,9 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         told = (MAINS if "mains" in one.figures else "") + begins + ADVICE[one.kind]
         told += KNOWN if 0 < len(faults) < len(names) else ""
     else:
-        told = "" if quick and one.kind in _NOTHING_ELSE else ADVICE[one.kind]
+        told = "" if faster_too and one.kind in _NOTHING_ELSE else ADVICE[one.kind]
         told += ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else ""
-    told = told + QUICK if quick else _with_what_lacks(told, lacked)
+    told = told + FASTER if faster_too else _with_what_lacks(told, lacked)
     said = told.format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),

@@ -20,9 +20,9 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
+from pulsetrainer.diagnosis.fast_causes import as_late, times_of
 from pulsetrainer.diagnosis.fitting import Simulator
 from pulsetrainer.diagnosis.problem import Problem
-from pulsetrainer.diagnosis.quick import as_late, times_of
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
@@ -41,7 +41,7 @@ SAMPLED_S = 1.0 / 160.0  # twenty samples in a range at the highest rate ...
 SAMPLED_AT_REST_S = 0.05  # ... and where the rests tell
 _RESTS = ("steps and holds", "heating")
 PACE = 1.0  # of minor loops, and of those around the heating
-_FASTER = (1.0, 4.0)  # a slow record may hide what is quicker than its own second
+_FASTER = (1.0, 4.0)  # a slow record may hide what is faster than its own second
 
 
 @dataclass(frozen=True)
@@ -72,17 +72,17 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     return max(found, key=lambda one: one.distance)
 
 
-def quick_of(state: State) -> float | None:
-    """Return the shortest time of what was found, s of the records, where it is as quick as the samples."""
+def fastest_of(state: State) -> float | None:
+    """Return the shortest time of what was found, s of the records, where it is as fast as the samples."""
     found = [one.cause.id for one in state.findings if one.found]
     known = [term for term in state.current.terms if term.cause.id in found]
     return min(times_of(known, state.problem.frames[0]), default=None)
 
 
 def as_fast_as_found(state: State) -> float:
-    """Return how many times faster an experiment must be to show what was found, if that is quick; else 1."""
-    quick = quick_of(state)
-    return 1.0 if quick is None else max(1.0, HOLD_S / (LIMITS.quick_stop * quick))
+    """Return how many times faster an experiment must be to show what was found, if that is fast; else 1."""
+    fastest = fastest_of(state)
+    return 1.0 if fastest is None else max(1.0, HOLD_S / (LIMITS.fast_stop * fastest))
 
 
 def sampled_s(name: str) -> float:

@@ -199,10 +199,10 @@ class Thresholds:
     rival_gain: float = 0.005  # of that gain: as good, if behind by no more than the largest of this, ...
     rival_relevant: float = 0.3  # ... this share of the relevant fall of squares, ...
     rival_late: float = 0.5  # of what is left above the quick noise: among lags, as good if behind by no more
-    quick_steps: float = 5.0  # time steps: what is no slower is as quick as the samples ...
-    quick_low: float = 1.1  # ... as is what comes so near to the shortest time that is searched
-    quick_share: float = 0.4  # of the part at once: a creep as late as a lag is first tried with so much
-    quick_stop: float = 5.0  # such times: by then all but 0.7 % has followed a step
+    fast_steps: float = 5.0  # time steps: what is no slower is as fast as the samples ...
+    fast_low: float = 1.1  # ... as is what comes so near to the shortest time that is searched
+    fast_share: float = 0.4  # of the part at once: a creep as late as a lag is first tried with so much
+    fast_stop: float = 5.0  # such times: by then all but 0.7 % has followed a step
     own_error: float = 1.5  # times what is left: devices of other kinds reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of the difference of two fits, by noise as it is
     finer: float = 2.0  # times that doubt: a superfluous parameter would move the others

@@ -19,10 +19,10 @@ from pulsetrainer.diagnosis import (
     advised,
     artefact,
     experiment,
+    fast_causes,
     floor,
     intervals,
     question,
-    quick,
     repeats,
     residual,
     screening,
@@ -910,7 +910,7 @@ def test_every_experiment_is_told_in_numbers_of_the_bench(name):
 
 
 @pytest.mark.parametrize("kind", ["lacks", "again", "extend", "correct"])
-def test_what_is_as_quick_as_the_samples_asks_for_a_faster_recording(kind):
+def test_what_is_as_fast_as_the_samples_asks_for_a_faster_recording(kind):
     """Ten hours, every 10 s: creep of 25 s was followed by stops of hours. Our device has one signal only."""
     figures = {"tau": 25.0 / 7700.0, "apart": 10.0 / 7700.0, "faster": 0.6 * 7700.0 / 25.0}
     one = Evidence(kind, figures=figures, names=("holds",))
@@ -926,7 +926,7 @@ def _quick(name, *values, dt_s=0.01, length=3000):
     """A cause with its values, on a record with so many samples."""
     frame = Frame(dt_s, np.zeros(length), 1.0, 1.0)
     term = Term(library()[name], values)
-    return quick.quick_s(term, frame), quick.as_late(term, frame)
+    return fast_causes.fast_s(term, frame), fast_causes.as_late(term, frame)
 
 
 @pytest.mark.parametrize(
@@ -944,7 +944,7 @@ def _quick(name, *values, dt_s=0.01, length=3000):
         ("resonance", (5.0, 0.1), None),
     ],
 )
-def test_what_is_as_quick_as_the_samples(name, values, tau):
+def test_what_is_as_fast_as_the_samples(name, values, tau):
     """At most five time steps, or at the short end of what is searched."""
     found, others = _quick(name, *values)
     assert found == tau
@@ -1250,10 +1250,10 @@ def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
 @pytest.mark.parametrize(
     ("tau", "late", "found"), [(0.03, 0.02, True), (0.1, 0.02, False), (0.03, 0.2, False)]
 )
-def test_what_is_quick_beside_a_fast_creep_may_be_what_its_formula_misses(tau, late, found):
+def test_what_is_fast_beside_a_fast_creep_may_be_what_its_formula_misses(tau, late, found):
     """Only beside a creep faster than 0.04 of the second, from which it is sought; none beside itself."""
     frame = Frame(0.01, np.zeros(3000), 1.0, 1.0)
     creep, lag = Term(CAUSE["creep"], (0.3, tau)), Term(CAUSE["output-lag"], (late,))
-    assert quick.beside_fast_creep(lag, (creep, lag), frame) is found
-    assert not quick.beside_fast_creep(creep, (creep, lag), frame)
-    assert not quick.beside_fast_creep(lag, (lag,), frame)
+    assert fast_causes.beside_fast_creep(lag, (creep, lag), frame) is found
+    assert not fast_causes.beside_fast_creep(creep, (creep, lag), frame)
+    assert not fast_causes.beside_fast_creep(lag, (lag,), frame)

@@ -8,7 +8,7 @@ The first of these that applies is the advice:
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
-- If a cause in doubt is as quick as the samples, a record that is as much faster is advised.
+- If a cause in doubt is as fast as the samples, a record that is as much faster is advised.
 - Otherwise it is what the verdict asks for: a fault of the measurement is taken out of the record
   (`correct`), a property of the device goes into the model (`extend`).
 
@@ -26,7 +26,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.experiment import as_fast_as_found, best_experiment, quick_of
+from pulsetrainer.diagnosis.experiment import as_fast_as_found, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -48,10 +48,10 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 def stage(state: State) -> State:
     """Return the state with its advice."""
     advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
-    quick = quick_of(state) if any(one.found and one.in_doubt for one in state.findings) else None
-    if quick is not None and "faster" not in advice.figures and state.question.timed:
+    fastest = fastest_of(state) if any(one.found and one.in_doubt for one in state.findings) else None
+    if fastest is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
-        figures = {"tau": quick, "apart": step, "faster": as_fast_as_found(state)}
+        figures = {"tau": fastest, "apart": step, "faster": as_fast_as_found(state)}
         advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
 

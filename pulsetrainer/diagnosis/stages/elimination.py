@@ -3,7 +3,7 @@
 Each cause is taken out of the full model in turn. The least important one is dropped if it makes no relevant
 difference. It is also dropped if it makes less than a five hundredth of the difference that all causes make
 together, since the formulas of the others are not that exact. Beside a creep faster than any that is
-tried, a cause as quick as the samples must make 8 % of it. This is repeated as long as a cause is dropped.
+tried, a cause as fast as the samples must make 8 % of it. This is repeated as long as a cause is dropped.
 
 There are two more reasons to drop a cause. A single cause, which has proved itself against the baseline, is
 dropped for these only:
@@ -25,8 +25,8 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
+from pulsetrainer.diagnosis.fast_causes import beside_fast_creep
 from pulsetrainer.diagnosis.fitting import Fitted
-from pulsetrainer.diagnosis.quick import beside_fast_creep
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS

@@ -4,8 +4,8 @@ When a cause was chosen, others were still missing. So each cause is taken out, 
 family, and every other kind of its own, is fitted in its place. The best is kept. A new cause inherits the
 p-value of the old one: the test was whether anything of this family is there, not which one (decision 044).
 
-For a lag or a force by speed that is as quick as the samples a creep is tried as well, for such a creep the
-lags, and one creep in the place of several quick causes (decision 128).
+For a lag or a force by speed that is as fast as the samples a creep is tried as well, for such a creep the
+lags, and one creep in the place of several fast causes (decision 128).
 
 Some causes have a finer formula with one more parameter. It takes the place of the plain one only if the fits
 differ by more than twice what noise, and what happens between two samples, can make.
@@ -21,10 +21,10 @@ from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
-from pulsetrainer.diagnosis.quick import as_late
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
@@ -69,7 +69,7 @@ def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
 
 
 def _one_creep(state: State) -> State:
-    """Return the state with one creep for several causes as quick as the samples, where that is as good."""
+    """Return the state with one creep for several causes as fast as the samples, where that is as good."""
     current, frame = state.current, state.problem.frames[0]
     creeps = {term: as_late(term, frame) for term in current.terms if not isinstance(term.cause, Creep)}
     several = [term for term, one in creeps.items() if one]

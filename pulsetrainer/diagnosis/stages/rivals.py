@@ -42,9 +42,9 @@ from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
-from pulsetrainer.diagnosis.quick import as_late
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -193,7 +193,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
 
     Lags in different places of the chain differ little. One also counts as good if it is behind by no more
     than a share of what is left above the noise from sample to sample: that may be the model's own error.
-    The same goes for a creep as quick as the samples.
+    The same goes for a creep as fast as the samples.
     """
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares
@@ -210,8 +210,8 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     close += [score for score in others if both_late(score, term) and score not in close]
     late = max(margin, LIMITS.rival_late * structure)
     tried = [(in_place(term, score), late if both_late(score, term) else margin) for score in close]
-    quick = [one for one in as_late(term, state.problem.frames[0]) if one.cause.id not in fitted.names]
-    tried += [(one, late) for one in quick]
+    late_too = [one for one in as_late(term, state.problem.frames[0]) if one.cause.id not in fitted.names]
+    tried += [(one, late) for one in late_too]
     for one, near in tried:
         if one.cause.id in found:
             continue

@@ -1,4 +1,4 @@
-"""Causes as quick as the samples: a slow record shows how late they make the output, and little else."""
+"""Causes as fast as the samples: a slow record shows how late they make the output, and little else."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
-def quick_s(term: Term, frame: Frame) -> float | None:
+def fast_s(term: Term, frame: Frame) -> float | None:
     """Return the time constant or delay of a cause, if a record hardly shows any shorter one; else None."""
     if term.cause.sudden or term.cause.stage == "record":
         return None
     bounds = term.cause.quantities(frame)
     times = [(value, one.low) for value, one in zip(term.values, bounds, strict=True) if one.unit == "s"]
-    shortest = LIMITS.quick_steps * frame.dt_s
-    quick = [max(value, frame.dt_s) for value, low in times if value <= max(shortest, LIMITS.quick_low * low)]
-    return min(quick, default=None)
+    shortest = LIMITS.fast_steps * frame.dt_s
+    fast = [max(value, frame.dt_s) for value, low in times if value <= max(shortest, LIMITS.fast_low * low)]
+    return min(fast, default=None)
 
 
 def as_late(term: Term, frame: Frame) -> list[Term]:
-    """Return creep for a quick lag, lags for a quick creep, that make the output as late; else nothing."""
-    tau = quick_s(term, frame)
+    """Return creep for a fast lag, lags for a fast creep, that make the output as late; else nothing."""
+    tau = fast_s(term, frame)
     if tau is None:
         return []
-    share = LIMITS.quick_share
+    share = LIMITS.fast_share
     if isinstance(term.cause, Creep):
         strength = max(term.values[0], 0.0)
         late = strength / (1.0 + strength) * term.values[1]
@@ -46,12 +46,12 @@ def _creep(amplitude: float, tau: float, frame: Frame) -> Term:
 
 
 def beside_fast_creep(term: Term, terms: Sequence[Term], frame: Frame) -> bool:
-    """Return whether a cause is as quick as the samples, beside a creep faster than any that is tried."""
-    fastest = LIMITS.quick_low * Creep.parameters[1].low
+    """Return whether a cause is as fast as the samples, beside a creep faster than any that is tried."""
+    fastest = LIMITS.fast_low * Creep.parameters[1].low
     creep = any(isinstance(one.cause, Creep) and one.values[1] <= fastest for one in terms if one is not term)
-    return creep and quick_s(term, frame) is not None
+    return creep and fast_s(term, frame) is not None
 
 
 def times_of(terms: Sequence[Term], frame: Frame) -> list[float]:
-    """Return the times of those causes that are as quick as the samples, s."""
-    return [tau for term in terms if (tau := quick_s(term, frame)) is not None]
+    """Return the times of those causes that are as fast as the samples, s."""
+    return [tau for term in terms if (tau := fast_s(term, frame)) is not None]
