@@ -26,9 +26,7 @@ _APART = 0.005  # of the output's span: a first stroke that runs so far from the
 _TIMES = 2.0  # ... if these run nearer to each other by this factor
 _MET = 0.5  # of how far they lie apart: strokes that differ by no more at the other end have met there
 _LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
-_CLOSING = (
-    0.02  # of the output's span: where nothing says how alike strokes are, so far apart they must begin
-)
+_CLOSING = 0.02  # of the output's span: a first stroke with one later one must begin so far apart
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
 _THIRDS = 3  # of a stroke: the first and the last are compared

@@ -20,7 +20,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
-from pulsetrainer.diagnosis.fast_causes import as_late, times_of
+from pulsetrainer.diagnosis.fast_causes import as_late, fast_s
 from pulsetrainer.diagnosis.fitting import Simulator
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
@@ -62,7 +62,7 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     plane = state.problem.plane
     found = []
     # lags look least alike in the shortest of records, which would tell nothing else
-    factors = (*_FASTER, as_fast_as_found(state)) if Creep.id in names else _FASTER
+    factors = (*_FASTER, as_fast_as(fastest_of(state, names))) if Creep.id in names else _FASTER
     for (name, shares), faster in product(_experiments().items(), factors):
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.static(u)
@@ -72,17 +72,16 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     return max(found, key=lambda one: one.distance)
 
 
-def fastest_of(state: State) -> float | None:
-    """Return the shortest time of what was found, s of the records, where it is as fast as the samples."""
-    found = [one.cause.id for one in state.findings if one.found]
-    known = [term for term in state.current.terms if term.cause.id in found]
-    return min(times_of(known, state.problem.frames[0]), default=None)
+def fastest_of(state: State, names: Sequence[str]) -> float | None:
+    """Return the shortest time of these causes, s of the records, where it is as fast as the samples."""
+    terms = [term for term in state.current.terms if term.cause.id in names]
+    times = (fast_s(term, state.problem.frames[0]) for term in terms)
+    return min((tau for tau in times if tau is not None), default=None)
 
 
-def as_fast_as_found(state: State) -> float:
-    """Return how many times faster an experiment must be to show what was found, if that is fast; else 1."""
-    fastest = fastest_of(state)
-    return 1.0 if fastest is None else max(1.0, HOLD_S / (LIMITS.fast_stop * fastest))
+def as_fast_as(tau: float | None) -> float:
+    """Return how many times faster an experiment must be to show a time, s; 1 where there is none."""
+    return 1.0 if tau is None else max(1.0, HOLD_S / (LIMITS.fast_stop * tau))
 
 
 def sampled_s(name: str) -> float:

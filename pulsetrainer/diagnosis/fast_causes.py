@@ -50,8 +50,3 @@ def beside_fast_creep(term: Term, terms: Sequence[Term], frame: Frame) -> bool:
     fastest = LIMITS.fast_low * Creep.parameters[1].low
     creep = any(isinstance(one.cause, Creep) and one.values[1] <= fastest for one in terms if one is not term)
     return creep and fast_s(term, frame) is not None
-
-
-def times_of(terms: Sequence[Term], frame: Frame) -> list[float]:
-    """Return the times of those causes that are as fast as the samples, s."""
-    return [tau for term in terms if (tau := fast_s(term, frame)) is not None]

@@ -26,7 +26,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.experiment import as_fast_as_found, best_experiment, fastest_of
+from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -48,10 +48,10 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 def stage(state: State) -> State:
     """Return the state with its advice."""
     advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
-    fastest = fastest_of(state) if any(one.found and one.in_doubt for one in state.findings) else None
+    fastest = fastest_of(state, [one.cause.id for one in state.findings if one.found and one.in_doubt])
     if fastest is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
-        figures = {"tau": fastest, "apart": step, "faster": as_fast_as_found(state)}
+        figures = {"tau": fastest, "apart": step, "faster": as_fast_as(fastest)}
         advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
 
