@@ -285,13 +285,18 @@ class Bench:
             times = ranges / min(experiment.RATES)
             return "one rate" if times == 1 else f"{times:.3g} times that rate"
         per_second = f"{shown(self.unit) or '1'}/s"
-        return with_unit(figure(ranges * self.scale.reach / self.scale.second), per_second)
+        return with_unit(figure(_set(ranges * self.scale.reach / self.scale.second)), per_second)
 
     def time(self, seconds: float) -> str:
         """Return a time of the diagnosis in words, in the unit of the record."""
         if not self.timed:
             return "several times as long as a loop takes"
-        return with_seconds(seconds * self.scale.second)
+        return with_seconds(_set(seconds * self.scale.second))
+
+
+def _set(value: float) -> float:
+    """Return a rate or a time as somebody would set it: 40 for 39.9."""
+    return float(f"{value:.{LIMITS.set_digits}g}")
 
 
 def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str] = ()) -> str:

@@ -273,7 +273,8 @@ class Thresholds:
     mains_Hz: tuple[float, float] = (50.0, 60.0)  # of all grids except some of railways
     mains_within: float = 0.01  # relative: EN 50160 allows more in half a per cent of a year only
     mains_harmonics: int = 3  # the higher ones lie so close together that any line is near one
-    told_digits: int = 3  # significant ones, of rates and widths
+    told_digits: int = 3  # significant ones, of widths and parameters
+    set_digits: int = 2  # significant ones, of rates and times to be set: 40 s, not 39.9
     plain_digits: int = 6  # before the decimal point: a number with fewer is written without an exponent
     told_to: float = 0.02  # of the range: levels to be set are rounded to the power of ten below this
 

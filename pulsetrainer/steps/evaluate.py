@@ -21,7 +21,7 @@ from pulsetrainer.artefacts import (
     WaveformEvaluation,
 )
 from pulsetrainer.artefacts.units import same_units, units_of
-from pulsetrainer.core import metrics
+from pulsetrainer.core import metrics, wild
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
@@ -149,6 +149,7 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
     found: list[ModelEvaluation] = []
     notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
+    notes += _wild_words(name, run)
     misfits: list[str] = []
     warnings: list[str] = []
     for title, model in zip(model_names, models, strict=True):
@@ -182,6 +183,17 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
     return Evaluation(
         models=tuple(found), model=models[-1], notes=tuple(notes), warnings=(*misfits, *warnings)
     )
+
+
+def _wild_words(name: str, run: Run) -> list[str]:
+    """Say how many samples of a run look wild: a model is not to blame for its error there."""
+    parts, reach = run.parts(SHORTEST_PART), float(np.ptp(run.input))
+    count = 0
+    for part, tamed in zip(parts, wild.tame([(one.input, one.output) for one in parts]), strict=True):
+        found = (tamed.wild_input | tamed.wild_output) & part.counts
+        count += int(np.count_nonzero(wild.by_chance(found, part.input, reach)))
+    looks = "1 sample looks" if count == 1 else f"{count} samples look"
+    return [f"{looks} wild in {name}, and count in its errors"] if count else []
 
 
 def _is_fitted_to(model: Model, run: Run) -> bool:

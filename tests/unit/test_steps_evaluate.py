@@ -61,6 +61,17 @@ def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
     assert notes[1] == ()
 
 
+@pytest.mark.parametrize(
+    ("at", "said"), [([], ()), ([300], ("1 sample looks",)), ([300, 700], ("2 samples look",))]
+)
+def test_wild_samples_of_a_run_are_told(at, said):
+    """They are not the model's fault; a clean run has none."""
+    error = 0.01 * np.random.default_rng(4).standard_normal(U.size)
+    error[at] += 0.5 * np.ptp(_run().output)
+    notes = evaluate(_run(error), MODEL, names=["a"]).notes
+    assert notes == tuple(f"{one} wild in a, and count in its errors" for one in said)
+
+
 def test_errors_of_a_playback_are_what_they_are_called():
     """Mean, largest and rms error, noise and spread of the repeats, lag of the current, width of the loop.
 
