@@ -14,6 +14,7 @@ import numpy as np
 from pulsetrainer.artefacts import Evaluation, Model, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
+from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.report.facts import coil_words, loop_words, minor_words, run_facts, span_words
 from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
@@ -21,6 +22,10 @@ from pulsetrainer.report.tables import text as shown
 
 _MORE_BEFORE = 1.05  # times the full force, in the strokes before the pulse: said
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
+_ROUNDING = 1e-6  # of the highest current
+_SHORT = 0.01  # of the full force: what a warm coil lacks at the top of a pulse is said
+_NEARLY_ALL = 0.9  # of the samples at the highest current
+_SURELY = 0.98  # of the force at the highest current: a coil warms on
 _LARGE = 100.0  # of a unit: of more, three decimals tell what no sensor does
 
 _VERDICT: Final = {True: "better", False: "worse", None: ""}
@@ -154,8 +159,28 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
         "samples": f"{drive.time_s.size} a repeat",
         "lost": counted(made.dropped_samples, "sample"),
         **coil_words(kelvin),
+        **_too_warm(made),
     }
     return payload, f"{out}: {drive_title(drive)} on {serial}", rows
+
+
+def _too_warm(made: Playback) -> dict[str, str]:
+    """Say what force a warm coil reaches, where that is less than the top of the pulse."""
+    drive, model, sent = made.waveform, made.waveform.model, made.compensated.reference
+    if made.temperature_K is None or model is None or not sent.size:
+        return {}
+    highest = operator_of(model).high
+    nearly = (1.0 - _ROUNDING) * highest
+    short = drive.scored & np.any(sent >= nearly, axis=0) & (drive.compensated < nearly)
+    lack = drive.target[short] - made.compensated.output[:, short]
+    if not np.isfinite(lack).any():
+        return {}
+    wanted = float(drive.target[short].max())
+    top = wanted - float(np.nanquantile(lack, _NEARLY_ALL))  # the largest one is noise
+    if wanted - top <= _SHORT * drive.full_force:
+        return {}
+    told = f"{top:.1f} of {wanted:.1f} {drive.output_unit} at {highest:g} {drive.input_unit}"
+    return {"too warm": f"{told}, the highest current: invert with --force-max {_SURELY * top:.3g}"}
 
 
 def refined(out: Path, made: Waveform, info: Any) -> Said:

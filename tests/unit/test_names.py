@@ -12,7 +12,7 @@ import report_examples as examples
 import store_examples
 
 import pulsetrainer as pt
-from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.artefacts import DrivePlayback, Evaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
 from pulsetrainer.artefacts.waveform import RefinePass
@@ -172,6 +172,21 @@ def test_what_was_played_took_both_drives_as_often_as_they_were_repeated():
     playback = store_examples.playback(n=20, repeats=3)
     told, _, _ = results.played(Path("played.h5"), playback, "serial", "firmware")
     assert told["seconds"] == pytest.approx(0.19 * 3 * 2)
+
+
+@pytest.mark.parametrize(("force", "said"), [(0.8, "0.8 of 1.0 N at 1 A, the highest current"), (0.995, "")])
+def test_what_a_warm_coil_lacks_at_the_top_is_told(force, said):
+    """It is sent the highest current where the cold coil needed less; half a per cent is not told."""
+    drive = store_examples.playback()
+    target, cold = np.linspace(0.0, 1.0, 20), np.linspace(0.0, 0.9, 20)
+    waveform = replace(drive.waveform, target=target, compensated=cold, scored=np.ones(20, bool))
+    sent, measured = np.minimum(cold / 0.85, 1.0), np.minimum(target, force)
+    warm = DrivePlayback(*(np.tile(one, (2, 1)) for one in (sent, sent, measured)))
+    played = replace(drive, waveform=waveform, compensated=warm, temperature_K=np.array([10.0, 11.0]))
+    rows = results.played(Path("played.h5"), played, "serial", "firmware")[2]
+    assert rows.get("too warm", "").startswith(said)
+    assert ("too warm" in rows) == bool(said)
+    assert "too warm" not in results.played(Path("p.h5"), replace(played, temperature_K=None), "", "")[2]
 
 
 def test_a_range_has_three_decimals_or_as_many_as_tell_its_ends_apart():
