@@ -1,9 +1,11 @@
 """Nothing hidden under noises of eight kinds, and effects at multiples of the limit that is stated for them.
 
     python tests/blind/noises.py controls --first 3000 --each 25 [--noise ar0.9 ...]
+    python tests/blind/noises.py effects --first 3000 --each 2 [--percent 1 5] [--effect creep ...] [--noise ...]
     python tests/blind/noises.py limits --first 3000 --each 2 [--noise white ...]
 
-Plants and noises are those of ``drawn``. The first prints the verdicts by noise. The second takes what
+Plants and noises are those of ``drawn``. The first prints the verdicts by noise, the second what is found of
+effects of some size (rms, per cent of the span). The third takes what
 the diagnosis of the plant with nothing hidden says it would have seen (``detectable_from_percent``), hides
 that effect in the same plant at 0.5, 1 and 2 times this size, and prints how often it is found, or tied.
 """
@@ -11,6 +13,7 @@ that effect in the same plant at 0.5, 1 and 2 times this size, and prints how of
 from __future__ import annotations
 
 import argparse
+import itertools
 import multiprocessing
 import os
 import sys
@@ -48,6 +51,14 @@ def control(job: tuple[str, int]) -> tuple[str, int, str, list[str]]:
     return noise, seed, state.verdict, names_of(state)
 
 
+def effects(job: tuple[str, str, float, int]) -> tuple[str, float, int, str, list[str], bool]:
+    """Judge one effect: what is found, in doubt or not, and whether nothing that matters is left."""
+    noise, effect, percent, seed = job
+    state = answered(drawn.draw(noise, effect, seed, percent=percent), seed)
+    found = [f"{one.cause.id}{'?' * one.in_doubt}" for one in state.findings if one.found]
+    return effect, percent, seed, state.verdict, found, state.is_whole(state.extended or state.current)
+
+
 def limits(job: tuple[str, int]) -> list[tuple[str, int, str, float, float, bool, str]]:
     """Hide each effect in one plant at multiples of its own limit."""
     noise, seed = job
@@ -65,13 +76,17 @@ def limits(job: tuple[str, int]) -> list[tuple[str, int, str, float, float, bool
 def main() -> None:
     """Print one of the two tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("what", choices=("controls", "limits"))
+    parser.add_argument("what", choices=("controls", "effects", "limits"))
     parser.add_argument("--first", type=int, default=3000, help="first seed")
     parser.add_argument("--each", type=int, default=25, help="plants of each noise")
     parser.add_argument("--noise", nargs="+", choices=drawn.NOISES, default=list(drawn.NOISES))
+    every = (*drawn.EFFECTS, *drawn.MORE)
+    parser.add_argument("--effect", nargs="+", choices=every, default=list(every))
+    parser.add_argument("--percent", nargs="+", type=float, default=[1.0], help="size, rms of the span")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     options = parser.parse_args()
-    jobs = [(noise, options.first + k) for k in range(options.each) for noise in options.noise]
+    seeds = range(options.first, options.first + options.each)
+    jobs = [(noise, seed) for seed in seeds for noise in options.noise]
     with multiprocessing.Pool(options.processes) as pool:
         if options.what == "controls":
             verdicts: dict[str, Counter[str]] = defaultdict(Counter)
@@ -82,6 +97,12 @@ def main() -> None:
             print("| noise | verdicts |\n|---|---|")
             for noise in options.noise:
                 print(f"| {noise} | {', '.join(f'{n} {v}' for v, n in verdicts[noise].most_common())} |")
+            return
+        if options.what == "effects":
+            hidden = itertools.product(options.noise, options.effect, options.percent, seeds)
+            for effect, percent, seed, verdict, names, whole in pool.imap_unordered(effects, hidden):
+                rest = "" if whole else ", more is left"
+                print(f"{effect} {percent:g} % {seed}: {verdict}; {' '.join(names)}{rest}", flush=True)
             return
         found: dict[tuple[str, float], list[bool]] = defaultdict(list)
         for rows in pool.imap_unordered(limits, jobs):
