@@ -1,7 +1,7 @@
 """Nothing hidden under noises of eight kinds, and effects at multiples of the limit that is stated for them.
 
     python tests/blind/noises.py controls --first 3000 --each 25 [--noise ar0.9 ...]
-    python tests/blind/noises.py effects --first 3000 --each 2 [--percent 1 5] [--effect creep ...] [--noise ...]
+    python tests/blind/noises.py effects --first 3000 --each 2 [--percent 1 5] [--effect creep] [--noise ...]
     python tests/blind/noises.py limits --first 3000 --each 2 [--noise white ...]
 
 Plants and noises are those of ``drawn``. The first prints the verdicts by noise, the second what is found of
