@@ -64,9 +64,23 @@ ADVICE: Mapping[str, str] = {
     ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
-        "No known cause fits. Record the same again and diagnose both together. If as much is left and no "
-        "cause is found, the model may not be able to follow a device of this kind; if not, something else "
-        "acts on it: vary one thing at a time, such as temperature, load or amplitude."
+        "No known cause fits. Record the same again and diagnose both together: that shows whether the "
+        "device does the same again, so that a model of this kind cannot follow it, or "
+        "something else acts on it."
+    ),
+    "another kind": (
+        "The device does the same again, so no other recording helps: a model of this kind does not follow "
+        "it further. Use the model if what it leaves does not matter to you, or a model of another kind."
+    ),
+    "something acts": (
+        "Something that is not in these recordings acts on the device or the sensor. Vary one thing at a "
+        "time, such as temperature, load or supply, and record the same again each time. Then keep what "
+        "matters as it is, and identify the model from a recording in which it was."
+    ),
+    "without the fault": (
+        "A fault of the measurement may be hidden in these recordings. Put it right (a sensor that drifts "
+        "must warm up), record the same again and identify a model from that. If it leaves less, the fault "
+        "was there: diagnose these recordings with that model to see how large it was."
     ),
     "none": "Nothing was found in this recording beyond what is taken for noise: use the model as it is.",
     "none, quick": "The quick screen found nothing. The full diagnosis shows smaller effects.",
@@ -116,7 +130,8 @@ ADVICE: Mapping[str, str] = {
     ),
     "extend": (
         "Extend the model with what was found, then compare both models on another recording, one that was "
-        "not fitted: pulsetrainer evaluate."
+        "not fitted: pulsetrainer evaluate. If you have one now, extend with --verify and it: what does not "
+        "hold there is not added."
     ),
     "extend, correct": (
         "Extend the model with what was found, then compare both models on another recording, one that was "
@@ -162,11 +177,12 @@ ADVICE: Mapping[str, str] = {
     "keep steady": (
         "Something that is not in these recordings changes the device or the measurement slowly. Let device "
         "and sensor warm up, keep room and supply as they are, look for draughts and loose plugs, and "
-        "record the same again. No other recording shows more before that."
+        "record the same again. Diagnose both together: if they differ, it was not the device."
     ),
     "identify anew": (
-        "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
-        "with the new model."
+        "Identify the model again in this condition, from loops of many sizes: a new run, or these "
+        "recordings if they hold such loops. If nothing was changed since, take them together with "
+        "those that the model was identified from. Then diagnose with the new model."
     ),
     "warm up": (
         "Let device and sensor warm up, record the same again, and identify the model from that recording. "
@@ -189,7 +205,7 @@ TABLE = (
 MISSING: Mapping[str, str] = {
     "rates": "the same loops at {slow}, {middle} and {fast}",
     "holds": "stops of {hold} at each of {levels}",
-    "length": "{short} or more in all",
+    "length": "{short} or more in all, with loops as fast as these",
     "time": (
         "with the time of every sample, the same loops at {slow}, {middle} and {fast}, and stops of {hold} "
         "at each of {levels}"

@@ -233,6 +233,10 @@ class Thresholds:
     unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not mentioned ...
     unexplained_span: float = 0.002  # ... nor is less of the span: devices of other kinds leave up to that
 
+    # Records of one input
+    same_input: float = 0.02  # of the range, rms: recordings whose inputs differ by less have the same one
+    comes_again: float = 0.8  # of what is left beyond noise: with more in both recordings it is the device's
+
     # A pinched loop
     pinch_groups: int = 51  # of the input's range: in each the distance between the branches is measured
     pinch: float = 0.15  # of the distance on both sides: drawn memristors reach 0.09, others 0.45 or more

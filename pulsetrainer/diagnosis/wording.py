@@ -52,6 +52,16 @@ TEXTS: Mapping[str, str] = {
         "{output} wanders, or the device changes slowly. Let device and sensor warm up, look for draughts "
         "and loose plugs, and record again"
     ),
+    "comes again": (
+        "In two of these recordings the {input} is the same, and {share:.0f} % of what is left is the same "
+        "too (squared, beyond noise). So it comes from the device, or from what is done to it each time, and "
+        "no model of this kind follows it"
+    ),
+    "differs": (
+        "In two of these recordings the {input} is the same, but {share:.0f} % of what is left differs "
+        "(squared, beyond noise). So it does not come from the {input}: something that was not recorded acts "
+        "on the device or the sensor"
+    ),
     "not accepted": (
         "Noise alone is unlikely to look like {names} (p = {p:.3f}). But when it is fitted together with "
         "the model, it is too small to matter, or it does not predict the parts of the recordings that "

@@ -6,6 +6,7 @@ It lists
 - for each cause found, what its gate saw, or its p-value and its share of the error;
 - what is left with all causes found;
 - where the rest is largest, if nothing explains it and it is more than noise;
+- whether that rest is the same in two records of one input;
 - whether what is taken for noise is slow, and whether the loop is pinched;
 - which cause screening took for significant, if none was found in the end;
 - what the records lack.
@@ -18,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis import equal_inputs, residual
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Finding
@@ -54,6 +55,7 @@ def stage(state: State) -> State:
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
         figures = {"white": percent * state.floor.white, "times": state.floor.slow}
         said.append(Evidence("bursts" if state.in_bursts else "slow noise", figures=figures))
+    said += equal_inputs.told(state)
     if state.verdict == "unknown" and state.pinched_at is not None:
         at = state.scale.low + state.pinched_at * state.scale.reach
         said.append(Evidence("crossed" if state.butterfly else "pinched", figures={"at": at}))

@@ -4,7 +4,9 @@ The first of these that applies is the advice:
 
 - If the model as given is of the wrong kind, or of another condition, another model is needed.
 - If the device was still settling when the records began, it must rest first.
-- If no verdict is reached and what is left follows time alone, device and sensor must be kept steady.
+- If no verdict is reached and what is left is the same in two records of one input, another kind of model is
+  needed. If it differs between them, or follows time alone, device and sensor must be kept steady. If the
+  weights may hide a fault of the measurement, a record without it is needed.
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
@@ -21,6 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.diagnosis import equal_inputs
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
@@ -42,6 +45,13 @@ _ANOTHER_MODEL = {
 }
 # ... and where nothing was found
 _NOT_AS_GIVEN = {"given worse, own": "warm up", "given worse": "identify anew"}
+# What the evidence says of what is left where no verdict is reached, and the advice; the surest comes first
+_OF_WHAT_IS_LEFT = {
+    equal_inputs.AGAIN: "another kind",
+    equal_inputs.DIFFERS: "something acts",
+    "zero wanders": "keep steady",
+    "held": "without the fault",
+}
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 
@@ -64,8 +74,9 @@ def _of_the_conditions(state: State) -> Evidence | None:
     began = [one for one in state.evidence if one.kind == "under way"]
     if began and state.extended is None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
-    wanders = state.verdict == "unknown" and any(one.kind == "zero wanders" for one in state.evidence)
-    return Evidence("keep steady") if wanders else None
+    seen = [one.kind for one in state.evidence] if state.verdict == "unknown" else []
+    told = [_OF_WHAT_IS_LEFT[kind] for kind in _OF_WHAT_IS_LEFT if kind in seen]
+    return Evidence(told[0]) if told else None
 
 
 def _not_as_given(state: State) -> Evidence | None:
