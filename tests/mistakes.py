@@ -403,6 +403,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "an option in the place of a file": (
         *("tune --drive --json", 2, "--drive must name a file, got the option --json", "after --drive"),
     ),
+    "the nearest of two commands": ("imprt", 2, "there is no command 'imprt'", "did you mean import?"),
     "a command in capitals": ("SHOW run.h5", 2, "there is no command 'SHOW'", "did you mean show?"),
     "a file as a command": ("run.h5", 2, "no command 'run.h5'", "pulsetrainer show run.h5"),
     "an update without its output": (

@@ -196,6 +196,7 @@ def unit_of(template: str, input_unit: str, output_unit: str) -> str:
     text = template
     for place, unit in (("{u}", input_unit), ("{y}", output_unit)):
         inner = f"({unit})" if _SEPARATOR.search(unit) else unit
+        text = text.removeprefix(f"{place} ") if unit == "1" else text  # no factor
         text = text.replace(f"/{place}", f"/{inner}").replace(place, unit)
     return text
 

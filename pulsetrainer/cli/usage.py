@@ -36,7 +36,7 @@ _NO_COMMAND = {
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
-_UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
+_UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in

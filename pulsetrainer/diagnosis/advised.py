@@ -135,8 +135,9 @@ ADVICE: Mapping[str, str] = {
     ),
     "extend, correct": (
         "Extend the model with what was found, then compare both models on another recording, one that was "
-        "not fitted: pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that "
-        "out of the recording."
+        "not fitted: pulsetrainer evaluate. From the measurement: {names}; the extended model was fitted "
+        "without that, so nothing has to be corrected first. For a clean recording, there is pulsetrainer "
+        "correct."
     ),
     "rest first": (
         "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "

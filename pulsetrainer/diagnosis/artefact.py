@@ -63,6 +63,8 @@ def diagnosis_of(state: State) -> Diagnosis:
         model.output_unit,
     )
     sign, words = model.polarity, _words(given) | bench.numbers()
+    empty = float(scale.outputs(np.asarray(extended.simulator.frames[0].zero)))
+    words["empty"] = with_unit(f"{sign * empty:.4g}", model.output_unit)
     dependences = learned(state, words)
     found = Diagnosis(
         verdict=state.verdict,
@@ -108,7 +110,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         correctable=tuple(state.correctable),
         polarity=sign,
         as_measured=True,
-        empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
+        empty=empty,
         in_model=state.in_model,
     )
     said = advised.advice(_advice(state), bench, found.next_command, found.correctable)
@@ -229,11 +231,21 @@ def _parameters(
     def told(e: Estimate) -> Parameter:
         own = words.get("seconds", "s") if e.unit == "s" else e.unit
         unit, meaning = unit_of(own, words["u"], words["y"]), meanings.get(e.name, "").format(**words)
+        meaning += _within(state, e.value, own, words) if cause.sudden and e is estimates[-1] else ""
         sign = cause.sign(e.name, polarity)
         low, high = (e.lower, e.upper) if sign > 0 else (-e.upper, -e.lower)
         return Parameter(e.name, sign * e.value, unit, low, high, meaning)
 
     return tuple(told(e) for e in estimates)
+
+
+def _within(state: State, moment: float, unit: str, words: Words) -> str:
+    """Say in which of several records a moment is, and when in that one."""
+    begins = [state.scale.second * frame.begin_s for frame in state.problem.frames]
+    if len(begins) == 1:
+        return ""
+    k = max((k for k, begin in enumerate(begins) if begin <= moment), default=0)
+    return f", {wording.figure(moment - begins[k])} {unit} into {wording.recording(k, words)}"
 
 
 def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[Dependence]) -> list[Cause]:

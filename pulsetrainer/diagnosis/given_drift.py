@@ -76,7 +76,11 @@ def told(state: State, judged: Judged, changed: Change, noise_rms: float) -> tup
         explains_percent=PERCENT * (1.0 - (near / far) ** 2),
         parameters=tuple(state.scale.estimate(Estimate(q.name, v, q.unit, v - h, v + h)) for q, v, h in rows),
         held_out_gain_percent=float("nan"),
-        seen=Evidence("against given", OffsetDrift.id, {"moved": judged.polarity * most, "left": near}),
+        seen=Evidence(
+            "against given" if near > 0 else "against given, nothing left",
+            OffsetDrift.id,
+            {"moved": judged.polarity * most, "left": near},
+        ),
     )
     if may_be_nothing(finding.cause.strengths_of(finding.parameters)):
         return None

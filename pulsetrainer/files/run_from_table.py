@@ -27,7 +27,7 @@ from pulsetrainer.artefacts.units import (
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.csv_dialect import cell_at, column_words
 from pulsetrainer.files.table import Table, read_table
-from pulsetrainer.files.time_stamps import stated_rate, unit_of_count
+from pulsetrainer.files.time_stamps import is_since_1970, stated_rate, unit_of_count
 from pulsetrainer.files.timing import check_timing
 
 _TIME_NAMES = frozenset(
@@ -44,6 +44,7 @@ _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or gi
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _SAME_RATE = 0.01  # of a rate: less may be rounding, or a clock
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
+_NAMED_UNREAD = 4  # columns: of many nobody reads the names
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
 
@@ -116,7 +117,7 @@ def run_from_table(
         signal=table.path.name,
     )
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
-    notes = (*notes, *_times_asked_for(table, meanings), *_other_units(table, meanings))
+    notes = (*notes, *_times_asked_for(table, meanings), *_other_units(table, meanings), *_not_read(table))
     if reference is not None:
         meanings["reference"] = (reference, run.input_unit)
     return TableRun(run, (*notes, *contradicted, *when.notes), _read_as(table, when.words, meanings))
@@ -186,15 +187,8 @@ def _time(
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
     heading = table.names[table.index(time)]
-    unit = _unit_of_time(table, heading)
-    notes: tuple[str, ...] = ()
-    if not unit and (unit := unit_of_count(float(table.columns[heading][0]), heading)):
-        told = "days of a spreadsheet" if unit == "d" else f"{unit} since 1970"
-        notes = (f"the column {heading} of {table.path} is taken as {told}, by its size",)
-        table = replace(table, units={**table.units, heading: unit})
-    elif not unit and _unknown_unit(table, heading):
-        said = f"the heading {heading!r} of {table.path} has no known unit: taken as seconds"
-        notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
+    unit, notes = _taken_as(table, heading)
+    table = replace(table, units={**table.units, heading: unit}) if unit else table
     words = f"time from {split_unit(heading)[0]} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
     stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
     if again:
@@ -208,6 +202,20 @@ def _time(
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return _Time(time_s, words, notes)
+
+
+def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of a column of time, by its heading or its size, and what there is to say of that."""
+    unit, first = _unit_of_time(table, heading), float(table.columns[heading][0])
+    by_size = "" if unit else unit_of_count(first, heading)
+    stamped = is_since_1970(first, unit) and not _as_written(table, heading, 0, "")
+    if by_size or stamped:
+        told = "days of a spreadsheet" if by_size == "d" else f"{by_size or unit or 's'} since 1970"
+        return by_size or unit, (f"the column {heading} of {table.path} is taken as {told}, by its size",)
+    if not unit and _unknown_unit(table, heading):
+        said = f"the heading {heading!r} of {table.path} has no known unit: taken as seconds"
+        return unit, (f"{said} (write the unit in brackets, such as 't [min]')",)
+    return unit, ()
 
 
 def _counted(table: Table, lack: str, remedy: str, *, whole: bool) -> _Time:
@@ -342,6 +350,20 @@ def _times_asked_for(table: Table, meanings: Mapping[str, tuple[str, str]]) -> l
         if _is_called_time(heading := table.names[table.index(column)])
         and bool(np.all(np.diff(table.columns[heading]) > 0))
     ]
+
+
+def _not_read(table: Table) -> list[str]:
+    """Say which columns of numbers were not read: one of them may be what a model misses."""
+    unread = (name for name in table.names if name not in table.columns and name not in table.text_names)
+    left = [
+        name
+        for name in unread
+        if name.lower() not in _ROW_NAMES
+        and not (_is_called_time(name) and table.units.get(name, "") in SECONDS)  # T_degC is no time
+    ]
+    more = len(left) - _NAMED_UNREAD
+    named = ", ".join(left[:_NAMED_UNREAD]) + (f" and {more} more" if more > 0 else "")
+    return [f"columns of {table.path} that were not read: {named}"] if left else []
 
 
 def _is_called_time(heading: str) -> bool:

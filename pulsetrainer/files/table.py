@@ -155,6 +155,8 @@ class Table:
             )
         near = [own for own in self.names if name.strip() and name.lower() in own.lower()]
         near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
+        # a short name is hardly like a heading with a unit
+        near = near or [own for own in self.names if _alike(split_unit(name)[0], split_unit(own)[0])]
         hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else "name one of these"
         bare_numbers = self.names == tuple(f"column{k}" for k in range(1, len(self.names) + 1))
         return DataError(
@@ -167,6 +169,10 @@ class Table:
 
 def _lacking(bad: int, rows: int) -> str:
     return f"{bad} of {counted(rows, 'row')} {'lacks' if bad == 1 else 'lack'} a number"
+
+
+def _alike(one: str, other: str) -> bool:
+    return bool(difflib.get_close_matches(one.lower(), [other.lower()], cutoff=0.5))
 
 
 def numbered(names: Sequence[str]) -> tuple[str, ...]:

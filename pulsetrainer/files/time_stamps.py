@@ -20,6 +20,7 @@ _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
 _POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}}),? {_TIME}")
 _UNIX = (("ms", 1e12), ("us", 1e15), ("ns", 1e18))  # counts since 1970, in 2001
+_IN_2001_S = 1e9  # counts in s since 1970; days, hours and minutes are counted from elsewhere
 _DECADES = 4.0  # times those: in 2096
 _SPREADSHEET_DAYS = (30_000.0, 60_000.0)  # since 1900, in 1982 and 2064
 _RATE = re.compile(
@@ -83,6 +84,12 @@ def unit_of_count(value: float, heading: str) -> str:
     if low < value < high and re.search("date|datum", heading, re.IGNORECASE):
         return "d"
     return next((unit for unit, least in _UNIX if least <= value <= _DECADES * least), "")
+
+
+def is_since_1970(value: float, unit: str) -> bool:
+    """Return whether a time in a unit (empty: s) is one of 2001 to 2096, told by its size."""
+    one = SECONDS.get(unit, 0.0)
+    return one <= 1.0 and _IN_2001_S <= one * value <= _DECADES * _IN_2001_S
 
 
 def stated_rate(comments: Iterable[str]) -> tuple[float, str] | None:

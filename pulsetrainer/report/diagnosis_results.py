@@ -24,6 +24,9 @@ _BASELINE: Final = (
 _EXTENDED: Final = (
     "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
 )  # fmt: skip
+# why a corrected run is as it was: of coarse steps; of a fault that another of the recordings has
+UNSEEN = "nothing shows what lies between the steps"
+ELSEWHERE = "what was found lies wholly outside this run, in another of the recordings that were diagnosed"
 
 
 def diagnosed(found: Diagnosis) -> dict[str, Any]:
@@ -123,12 +126,18 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
     masked = int((~made.counts).sum())
     payload = {"output": out, "corrected": made.corrected, "masked_samples": masked}
     change = largest_change(measured, made)
-    rows = {"taken out": ", ".join(made.corrected)}
-    if change or not masked:
+    unchanged = is_unchanged(measured, made)
+    rows = {"taken out": "nothing" if unchanged else ", ".join(made.corrected)}
+    if not unchanged and (change or not masked):
         rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit)
     filled = ", filled in between their neighbours" if masked else ""
     rows["samples left out"] = f"{masked} of {made.output.size}{filled}"
     return payload, f"{out}: corrected run", rows
+
+
+def is_unchanged(measured: Run, made: Run) -> bool:
+    """Tell whether nothing was taken out of a corrected run."""
+    return not largest_change(measured, made) and bool(made.counts.sum() == measured.counts.sum())
 
 
 def largest_change(measured: Run, made: Run) -> float:

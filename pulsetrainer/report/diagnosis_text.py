@@ -16,6 +16,7 @@ from pulsetrainer.report.tables import Facts, Table
 _SHOWN = 8  # causes in the table
 _CURVE = re.compile(r"[fg]\d+")  # the values of a learned curve, of a gain: one by one they say nothing
 _OF_A_CURVE = ("state", "low", "high")
+DRAWN = "the report (--html) draws it"
 # what is left by each model: in words, then the fields of single samples and of short averages
 ERRORS = (
     ("the model as given", "rms_percent", ""),
@@ -118,8 +119,8 @@ def answer(one: Cause, found: Diagnosis) -> str:
     return "no: another explains more" if found.found else "no: too small to matter"
 
 
-def parameters(several: Sequence[Parameter]) -> dict[str, str]:
-    """Return parameters by name, each with unit, interval and meaning; the values of a curve in one line."""
+def parameters(several: Sequence[Parameter], *, drawn: str = DRAWN) -> dict[str, str]:
+    """Return parameters by name, each with unit, interval and meaning; of a curve, where it is ``drawn``."""
     said: dict[str, str] = {}
     # what was chosen, such as how many time constants there are, comes after what was measured
     for one in sorted(several, key=lambda one: one.chosen):
@@ -132,7 +133,7 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
         times, unit, to = (100.0, "%", "gain") if of_gain else (1.0, values[begin].unit, "output")
         curve = [0.0, *(times * one.value for one in values[begin:end])]
         ends = with_unit(f"{min(curve):.3g} to {max(curve):.3g}", unit)
-        said[_numbered("curve", said)] = f"{ends}: what it adds to the {to}; the report (--html) draws it"
+        said[_numbered("curve", said)] = f"{ends}: what it adds to the {to}; {drawn}"
     return said
 
 

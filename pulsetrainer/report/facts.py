@@ -106,9 +106,10 @@ def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
 
 def minor_words(percent: float, switched_percent: float) -> str:
     """Say how many cells minor loops tell apart, and what of the others is known."""
-    nothing = ", or nothing did" if switched_percent < _ALL else ""
+    by = "only the major loop" if switched_percent >= _ALL else "only the major loop, or nothing,"
     rest = (
-        f"; only the major loop switched the rest{nothing}: smaller loops within it would tell them apart"
+        f"; {by if switched_percent > 0 else 'nothing'} switched the rest: "
+        f"smaller loops within {'it' if switched_percent > 0 else 'the range'} would tell them apart"
         if percent < _HARDLY
         else ""
     )

@@ -26,6 +26,7 @@ _ROUNDING = 1e-6  # of the highest current
 _SHORT = 0.01  # of the full force: what a warm coil lacks at the top of a pulse is said
 _NEARLY_ALL = 0.9  # of the samples at the highest current
 _SURELY = 0.98  # of the force at the highest current: a coil warms on
+_WORSE = 1.0  # per cent of the rms error of the first model: the figures of the table do not show less
 _LARGE = 100.0  # of a unit: of more, three decimals tell what no sensor does
 
 _VERDICT: Final = {True: "better", False: "worse", None: ""}
@@ -289,7 +290,7 @@ def worse(evaluation: Evaluation) -> list[str]:
         f"{m.name} predicts it worse than {one.name}: its rms error is {digits(-m.gain_percent)} % larger"
         for one in first
         for m in evaluation.models
-        if m.gain_percent < 0
+        if m.gain_percent < -_WORSE
     ]
 
 

@@ -283,12 +283,18 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     if not high > low:
         listed = ", ".join(dict.fromkeys(names))
+        command = ": pulsetrainer capture identification -o run.h5" if _are_ours(runs) else ""
         raise DataError(
             f"the input of {listed} does not move: it is {with_unit(f'{low:g}', runs[0].input_unit)} "
             "in all samples",
-            hint="record a run that sweeps the range: pulsetrainer capture identification -o run.h5",
+            hint=f"record a run that sweeps the range{command}",
         )
     return low, high
+
+
+def _are_ours(runs: Sequence[Run]) -> bool:
+    """Whether all runs were captured on our own device."""
+    return all(run.captured or run.signal in EXCITATIONS for run in runs)
 
 
 def _resampled(fitted: Fitted, draws: int, seed: int, notes: list[str]) -> uncertainty.Ensemble | None:
@@ -392,7 +398,7 @@ def _model(
         form=fitted.form,
         # files of 0.1 do not say where a run is from; these names only captures had
         coil=next((run.coil for run in runs if run.coil is not None), None),
-        captured=all(run.captured or run.signal in EXCITATIONS for run in runs),
+        captured=_are_ours(runs),
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,
         fit=Fit(

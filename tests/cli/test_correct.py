@@ -73,6 +73,20 @@ def test_where_nothing_tells_what_lies_between_steps_that_is_said(folder):
     np.testing.assert_array_equal(pt.load(folder / "unchanged.h5").output, stepped.output)
 
 
+def test_a_step_of_another_recording_takes_nothing_out_of_this_one(folder):
+    """Nor is a word said of coarse steps between which something may lie."""
+    run = pt.load(folder / "other.h5")
+    numbers = (("offset", 4.0, "N"), ("gain", 0.6, "1"), ("time", 50.0, "s"))  # the run lasts 20 s
+    step = Cause("step", True, 0.005, 9.0, 9.0, tuple(Parameter(n, v, unit, v, v) for n, v, unit in numbers))
+    pt.save(replace(_diagnosis(run, "step", (step,)), empty=0.0), folder / "later.h5")
+    done = pulsetrainer(folder, "correct", "other.h5", "--diagnosis", "later.h5", "-o", "same.h5")
+    assert done.code == 0, done
+    assert "what was found lies wholly outside this run" in done.err
+    assert "between the steps" not in done.err
+    assert "taken out         nothing" in done.out
+    assert "largest change" not in done.out
+
+
 def test_a_fault_in_doubt_is_left_in(folder):
     """A step that was found, but predicts worse or may be nothing, changes no sample; the rest is said."""
     told = pt.load(folder / "diagnosis.h5")

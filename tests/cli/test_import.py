@@ -110,6 +110,9 @@ def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     assert not (tmp_path / "run.h5").exists()
     done = run("import", "a.csv", "--input", "CURR", "--output", "force_N", "-o", "run.h5")
     assert "did you mean 'current_A'" in done.err
+    (tmp_path / "b.csv").write_text("t_s,current_A,temp (degC)\n0,0,0\n1,1,1\n")
+    done = run("import", "b.csv", "--input", "current_A", "--output", "tmp", "-o", "run.h5")
+    assert "'temp (degC)'?" in done.err  # a short name is not like a heading with a unit
 
 
 def test_columns_may_be_given_by_their_numbers(run, tmp_path):

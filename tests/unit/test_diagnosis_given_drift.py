@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import pulsetrainer as pt
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.diagnosis import given_drift
+from pulsetrainer.diagnosis import given_drift, wording
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.given_drift import drift_in
@@ -118,3 +118,20 @@ def test_a_drift_that_may_be_nothing_is_not_told(monkeypatch, error, is_told):
     judged = SimpleNamespace(measured=said, predicted=said, polarity=1)
     told = given_drift.told(state, judged, SimpleNamespace(left=1.0), 0.1)
     assert (told is not None) is is_told
+
+
+@pytest.mark.parametrize(("left", "said"), [(0.1, "leaves 0.1 (rms)"), (0.0, "leaves no more than noise")])
+def test_what_a_drift_leaves_is_told_as_noise_where_it_is_no_more(monkeypatch, left, said):
+    """It was told as 0 um."""
+    drift, zeros = given_drift.Drifted(OffsetDrift(), (0.01, 0.0), (0.001, 0.001)), np.zeros(N)
+    monkeypatch.setattr(given_drift, "_with_drift", lambda *_: (drift, zeros, zeros + 0.9))
+    monkeypatch.setattr(given_drift, "left_by", lambda _, predicted, __: left if predicted is zeros else 1.0)
+    monkeypatch.setattr(given_drift, "is_near", lambda *_: True)
+    monkeypatch.setattr(given_drift, "weights_for", lambda *_: "weights")
+    state = SimpleNamespace(
+        question=SimpleNamespace(timed=True, quick=False), findings=(), current=SimpleNamespace(terms=()),
+        problem=SimpleNamespace(frames=[FRAME]), scale=SimpleNamespace(estimate=lambda one: one),
+    )  # fmt: skip
+    judged = SimpleNamespace(measured=zeros, predicted=zeros + 1.0, polarity=1)
+    finding, _ = given_drift.told(state, judged, SimpleNamespace(left=1.0), 0.1)
+    assert said in wording.cause_text(finding, wording.PLAIN)

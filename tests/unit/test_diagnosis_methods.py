@@ -985,6 +985,12 @@ def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
+def test_a_fault_beside_an_extension_is_not_told_as_a_step_that_is_missing():
+    """`then` extends the model alone, as it was fitted without the fault."""
+    said = advised.advice(Evidence("extend, correct", names=("outliers",)), advised.Bench(Scale(), "A"))
+    assert "outliers; the extended model was fitted without that, so nothing has to be corrected" in said
+
+
 @pytest.mark.parametrize("kind", ["none", "none, small", "extend", "extend, or late", "extend, correct"])
 def test_what_can_be_done_now_comes_before_what_to_record(kind):
     """`next` asked for a recording, `then` to extend the model: in no order."""

@@ -157,6 +157,9 @@ def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
     adds = "what it adds to the"
     known = [f"-0.2 to 0.4 N: {adds} output", f"-2 to 4 %: {adds} gain", f"-0.4 to 0.8 N: {adds} output"]
     assert told == known[:count]
+    assert all(text.endswith("the report (--html) draws it") for text in said.values() if adds in text)
+    on_the_page = parameters(sum(curves, kept), drawn="drawn below").values()
+    assert all(text.endswith("; drawn below") for text in on_the_page if adds in text)
 
 
 def test_where_nothing_is_left_no_cause_explains_a_share_of_it():

@@ -14,8 +14,8 @@ import pytest
 import report_examples as examples
 import store_examples
 
-from pulsetrainer.artefacts import Evaluation
-from pulsetrainer.report.diagnosis_html import headline
+from pulsetrainer.artefacts import Evaluation, Parameter
+from pulsetrainer.report.diagnosis_html import headline, render_diagnosis
 from pulsetrainer.report.html import offset, render_evaluation
 
 PUBLISHED = {
@@ -335,6 +335,16 @@ def test_evaluation_of_nothing_says_so():
     text = render(Evaluation())
     assert "neither played waveforms nor models" in text
     assert Page(text).of("figure") == []
+
+
+def test_the_report_does_not_send_to_itself_for_a_curve():
+    """On the screen `--html` draws it; here the figure stands below."""
+    found = store_examples.diagnosis()
+    curve = tuple(Parameter(f"f{k}", 0.1 * k, "N", 0.0, 1.0) for k in (2, 3))
+    causes = tuple(replace(one, parameters=curve) for one in found.causes)
+    page = render_diagnosis(replace(found, causes=causes), title="", created="", provenance_json="{}")
+    assert "what it adds to the output; drawn below" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "--html" not in page
 
 
 def test_the_heading_of_a_diagnosis_is_short():

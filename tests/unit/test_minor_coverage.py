@@ -46,7 +46,10 @@ def test_what_nothing_has_switched_is_not_said_of_the_major_loop():
         "only the major loop switched the rest: smaller loops within it would tell them apart"
     )
     assert minor_words(7.0, 7.7).endswith(
-        "only the major loop switched the rest, or nothing did: smaller loops within it would tell them apart"
+        "only the major loop, or nothing, switched the rest: smaller loops within it would tell them apart"
+    )
+    assert minor_words(0.0, 0.0).endswith(
+        "nothing switched the rest: smaller loops within the range would tell them apart"
     )
     assert minor_words(99.0, 99.0) == "99 % of the cells"
 

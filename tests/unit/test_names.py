@@ -74,6 +74,8 @@ def test_a_negative_improvement_is_told_in_words():
     header = {"title": "t", "created": "c", "provenance_json": "{}"}
     assert said in html.render_evaluation(told, **header).replace("\N{NO-BREAK SPACE}", " ")
     assert results.worse(Evaluation(models=(first, better))) == []
+    hardly = replace(better, name="hardly", gain_percent=-0.0132)  # 2.02 and 2.02 % in the table
+    assert results.worse(Evaluation(models=(first, hardly))) == []
 
 
 @pytest.mark.parametrize(

@@ -134,3 +134,13 @@ def test_a_moment_of_a_record_without_time_is_a_number_of_samples(timed, unit):
     found = pt.diagnose(run, pt.identify(run, levels=12), quick=True)
     step = next(one for one in found.causes if one.cause == "step")
     assert {one.name: one.unit for one in step.parameters} == {"offset": "N", "gain": "1", "time": unit}
+
+
+@pytest.mark.parametrize("captured", [True, False])
+def test_only_who_captured_a_run_is_sent_to_capture_another(captured):
+    """Of an imported one, the command would be that of another device."""
+    still = np.ones(20)
+    with pytest.raises(DataError) as caught:
+        pt.identify(pt.Run(time_s=None, input=still, output=still, captured=captured))
+    assert "record a run that sweeps the range" in caught.value.hint
+    assert ("pulsetrainer capture" in caught.value.hint) is captured

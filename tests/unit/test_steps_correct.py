@@ -288,3 +288,29 @@ def test_what_cannot_be_corrected_is_not_called_sound(verdict, goes_on):
     told = instead(found)
     assert ("Record again." in told) is goes_on
     assert ("as it is" in told) is not goes_on
+
+
+def test_what_is_told_of_a_step_is_enough_to_compute_it():
+    """The offset is that at one output, which is told: of a gain alone it was read as a shift of the zero."""
+    tips = np.concatenate([np.linspace(1, 0.2, 8), np.linspace(0.3, 1, 8)])
+    u = np.interp(
+        np.arange(1600), np.linspace(0, 1599, 2 * tips.size + 1), np.append(np.stack([0 * tips, tips], 1), 0)
+    )
+    noise = 0.002 * SPAN * np.random.default_rng(1).standard_normal((2, u.size))
+    before, y = -_plant(12)(u) - 5.0 + noise
+    t = np.arange(u.size) / 50.0
+    runs = [
+        pt.Run(time_s=t, input=u, output=one, input_unit="A", output_unit="N")
+        for one in (before, np.where(t > 18.2, 1.1 * y, y))
+    ]
+    found = pt.diagnose(runs, pt.identify(runs[0], levels=12), names=["a.h5", "b.h5", "m.h5"])
+    assert found.verdict == "step"
+    told = {one.name: one for one in found.found[0].parameters}
+    assert told["offset"].meaning.startswith("added to the force from then on where that is ")
+    middle = float(told["offset"].meaning.split()[-2])
+    assert middle < -4.0
+    assert f"distance from {middle:g} N is added as well" in told["gain"].meaning
+    assert told["offset"].value - told["gain"].value * middle == pytest.approx(0.0, abs=0.05)  # 1.1 y
+    at, unit, *where = told["time"].meaning.rpartition(", ")[2].split()
+    assert (unit, *where) == ("s", "into", "b.h5")
+    assert float(at) == pytest.approx(18.2, abs=0.5)

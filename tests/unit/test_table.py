@@ -450,6 +450,43 @@ def test_counts_since_a_date_are_told_by_their_size(table, heading, first, step,
     assert any(f"taken as {told}, by its size" in note for note in read.notes)
 
 
+@pytest.mark.parametrize(
+    ("heading", "first", "told"),
+    [
+        ("ts_ms", "1750000000000", "ms since 1970"),
+        ("unix", "1750000000", "s since 1970"),
+        ("time_utc", "1750000000", "s since 1970"),
+        ("t_us", "1750000000", ""),  # half an hour
+        ("when", "2026-11-27 10:00:00", ""),  # nobody has to guess
+    ],
+)
+def test_a_time_since_1970_is_told_whatever_the_heading_says_of_its_unit(table, heading, first, told):
+    """The guide promises a note."""
+    last = first[:-1] + "9"
+    read = run_from_table(table(f"{heading},u,y\n{first},0,1\n{last},1,2\n").path, **COLUMNS)
+    assert read.run.time_s is not None
+    said = [note for note in read.notes if "1970" in note]
+    assert len(said) == bool(told)
+    assert all(f"{heading} of" in note and f"taken as {told}, by its size" in note for note in said)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["T_degC"], "T_degC"),
+        (["a", "b", "c", "d", "e", "f"], "a, b, c, d and 2 more"),
+        (["remark"], ""),
+    ],
+)
+def test_columns_that_were_not_read_are_named(table, more, told):
+    """One of them may be what the model misses; text is none, nor another time, nor a row's number."""
+    cells = ",".join("x" if name == "remark" else "7" for name in more)
+    rows = "".join(f"{k},{k / 10},{k % 3},{k},{k},{cells}\n" for k in range(20))
+    path = table(f"n,t_s,u,y,timestamp,{','.join(more)}\n" + rows).path
+    read = run_from_table(path, **COLUMNS, time="t_s")
+    assert list(read.notes) == ([f"columns of {path} that were not read: {told}"] if told else [])
+
+
 def test_stamps_of_more_digits_than_a_number_holds_are_told(table):
     """In 1 us of 1.8e18 ns a quarter is lost: the steps are uneven by so much."""
     rows = "".join(f"{1_772_366_400_000_000_000 + 1000 * k},{k % 3},{k}\n" for k in range(20))

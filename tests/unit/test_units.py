@@ -184,6 +184,13 @@ def test_a_unit_behind_a_slash_stands_in_brackets(template, u, unit):
     assert is_unit(unit)
 
 
+def test_a_pure_number_is_no_factor_of_a_unit():
+    """It was printed as ``1 (s/Oe)^0.5``; above a slash it stays."""
+    assert unit_of("{y} (s/{u})^0.5", "Oe", "1") == "(s/Oe)^0.5"
+    assert unit_of("{y} s/{u}", "Oe", "1") == "s/Oe"
+    assert unit_of("{y}/{u}", "Oe", "1") == "1/Oe"
+
+
 @pytest.mark.parametrize(
     ("seconds", "said"),
     [

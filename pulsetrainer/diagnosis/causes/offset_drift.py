@@ -66,6 +66,11 @@ class OffsetDrift(Cause):
             "from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide "
             "some of the drift"
         ),
+        "against given, nothing left": (
+            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
+            "from that, the model leaves no more than noise. Weights refitted to these recordings hide some "
+            "of the drift"
+        ),
     }
 
     def __init__(self, count: int = _PLAIN) -> None:

@@ -36,8 +36,17 @@ class Step(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output} from then on"),
-        Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of what it was"),
+        Quantity(
+            "offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output} from then on where that is {empty}"
+        ),
+        Quantity(
+            "gain",
+            "1",
+            -0.9,
+            0.9,
+            1e-4,
+            "change of the gain: this share of the distance from {empty} is added as well",
+        ),
         Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
     )
     sudden = True
