@@ -1202,12 +1202,12 @@ def test_advice_to_record_again_says_how():
 
 @pytest.mark.parametrize("name", sorted(CAUSE))
 def test_every_parameter_of_every_cause_says_of_what_it_is(name):
-    """Fitted ones by their quantities, what a gate tells as a size; no brace but those of the two names."""
+    """Fitted ones by their quantities, what a gate tells as a size; no brace but those of three names."""
     frame = Frame(0.01, np.linspace(0.0, 1.0, 100), span=1.0, reach=1.0)
     meanings = [one.meaning for one in CAUSE[name].quantities(frame)]
     meanings += [CAUSE[name].size] if CAUSE[name].stage == "record" else []
     assert all(meanings)
-    assert not any("{" in one.format(input="u", output="y") for one in meanings)
+    assert not any("{" in one.format(input="u", output="y", empty="y0") for one in meanings)
 
 
 def test_evidence_names_its_cause_and_its_record():
