@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pulsetrainer.artefacts.units import shown, with_seconds, with_unit
@@ -273,7 +273,7 @@ class Bench:
             "turns": self._levels(experiment.TURNS),
             "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
             **{name: self._rate(faster * one) for name, one in rates.items()},
-            **{name: self.time(one / faster) for name, one in times.items()},
+            **{name: self.time(one / faster, math.ceil) for name, one in times.items()},  # or more
         }
 
     def lasting(self, name: str, faster: float) -> str:
@@ -282,7 +282,7 @@ class Bench:
 
     def often(self, name: str, faster: float) -> str:
         """Return how often an experiment must be sampled, as the end of a phrase."""
-        every = self.time(experiment.sampled_s(name) / faster) if self.timed else ""
+        every = self.time(experiment.sampled_s(name) / faster, math.floor) if self.timed else ""
         return f", sampled at least every {every}" if every and not self.ours else ""
 
     def _levels(self, shares: Sequence[float]) -> str:
@@ -304,16 +304,17 @@ class Bench:
         per_second = f"{shown(self.unit) or '1'}/s"
         return with_unit(figure(_set(ranges * self.scale.reach / self.scale.second)), per_second)
 
-    def time(self, seconds: float) -> str:
-        """Return a time of the diagnosis in words, in the unit of the record."""
+    def time(self, seconds: float, to_whole: Callable[[float], int] = round) -> str:
+        """Return a time of the diagnosis in words, in the unit of the record, rounded as asked."""
         if not self.timed:
             return "several times as long as a loop takes"
-        return with_seconds(_set(seconds * self.scale.second))
+        return with_seconds(_set(seconds * self.scale.second, to_whole))
 
 
-def _set(value: float) -> float:
+def _set(value: float, to_whole: Callable[[float], int] = round) -> float:
     """Return a rate or a time as somebody would set it: 40 for 39.9."""
-    return float(f"{value:.{LIMITS.set_digits}g}")
+    step = 10.0 ** (math.floor(math.log10(value)) + 1 - LIMITS.set_digits)
+    return float(f"{to_whole(round(value / step, 6)) * step:.{LIMITS.set_digits}g}")
 
 
 def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str] = ()) -> str:
