@@ -37,7 +37,7 @@ _BENT = 0.5  # of the hump: a hum bends the other way before it
 _MOST = 3.0  # times that: more is no course that goes on, but the ringing of a device that has stopped
 _STILL = 0.25  # of the fall must come at the end of the rest: what rings or relaxes has calmed down
 _STEPS = 3.0  # steps of the input: a coarse converter makes a turn look like a rest, with a hump of one
-_TURN = 6.0  # times the noise of the input: a turn may look like a rest within it
+_TURN = 8.0  # times the noise of the input: a turn may look like a rest within it, and so may the way to it
 _SMALL = 0.1  # quantile of the moves of the input: those of a coarse converter are a step or more
 _OWN = 0.25  # of the way that the output tells: an input with noise may turn by less
 
@@ -169,7 +169,7 @@ def _goes_on(told: _Rests, unseen: float, noise: float) -> bool:
         "goes on": _RISE * before <= rise.mean() <= _MOST * before,
         "comes back": _FALL * after <= fall.mean() <= _MOST * after,
         "under way": np.mean(output[:, -2] - output[:, -1]) >= _STILL * fall.mean(),
-        "no step": way > unseen,
+        "no step": min(way, u_before) > unseen,
         "no turn": _hump(told.input).mean() < _OWN * way,
     }
     return all(conditions.values())
