@@ -43,7 +43,7 @@ _OWN = 0.25  # of the way that the output tells: an input with noise may turn by
 
 
 @dataclass(frozen=True)
-class _Rests:
+class Rests:
     """What input and output do in each rest of the input at one end, and before and after it."""
 
     input: FloatArray  # (k, parts) means
@@ -121,7 +121,7 @@ def _within_noise(u: FloatArray) -> BoolArray:
     return np.asarray(scipy.ndimage.binary_opening(at, np.ones(_SMOOTH)))
 
 
-def _rests(u: FloatArray, y: FloatArray, at: BoolArray) -> _Rests | None:
+def _rests(u: FloatArray, y: FloatArray, at: BoolArray) -> Rests | None:
     """Return what is told of the rests that are long enough, and no end of the record; None of too few."""
     edges = np.diff(at.astype(np.int8), prepend=0, append=0)
     begins, ends = (np.flatnonzero(edges == way).tolist() for way in (1, -1))
@@ -135,7 +135,7 @@ def _rests(u: FloatArray, y: FloatArray, at: BoolArray) -> _Rests | None:
     output = np.asarray([_means(y[b:e]) for b, e in long])
     earlier = np.asarray([_means(y[b - max((e - b) // 2, _PARTS) : b]) for b, e in long])
     way = np.sign(np.sum(output[:, 0] - earlier.mean(axis=1)))
-    return _Rests(
+    return Rests(
         np.asarray([_means(u[b:e]) for b, e in long]),
         way * output,
         np.asarray([[np.ptp(x[b - (e - b) // 2 : b + 1]) for x in (u, y)] for b, e in long]),
@@ -154,7 +154,7 @@ def _hump(parts: FloatArray) -> FloatArray:
     return np.asarray(parts[:, _PARTS // 2] - 0.5 * (parts[:, 0] + parts[:, -1]))
 
 
-def _goes_on(told: _Rests, unseen: float, noise: float) -> bool:
+def _goes_on(told: Rests, unseen: float, noise: float) -> bool:
     """Whether the output has a hump in most rests, beyond noise and what the input may have done unseen."""
     output, top = told.output, int(np.argmax(told.output.mean(axis=0)))
     if not _PARTS // 2 <= top < _PARTS - 1:
