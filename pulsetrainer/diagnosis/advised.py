@@ -166,6 +166,12 @@ ADVICE: Mapping[str, str] = {
         "The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a "
         "run over the whole range in which it is used, and diagnose with the new model."
     ),
+    "clipped input": (
+        "The recorder clips the {input} at {rail:.4g}{in_u}: widen its range, or keep the {input} within it, "
+        "and record again. What it did not see cannot be put back (pulsetrainer correct does not try). Until "
+        "then use no model that was identified from such a recording: it is wrong beyond {rail:.4g}{in_u}, "
+        "and after the {input} was there. A model from a sound recording stays as it is."
+    ),
     "repair": "No model can represent this: put right what was found, and record again.",
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
@@ -264,6 +270,7 @@ class Bench:
             "second": "second" if self.timed else "sample",
             "seconds": "s" if self.timed else "samples",
             **{name: with_unit(self._number(share), self.unit) for name, share in shares.items()},
+            "in_u": with_unit("", self.unit),
             "highest": self._number(1.0),
             "columns": joined(
                 [f"{name} in {shown(unit)}" if shown(unit) else name for name, unit in columns]

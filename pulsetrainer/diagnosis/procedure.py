@@ -62,6 +62,11 @@ QUICK: tuple[tuple[Callable[[State], State], float], ...] = (
     (given_model.stage, 0.9),
     (advice.stage, 1.0),
 )
+VOID: tuple[tuple[Callable[[State], State], float], ...] = (  # what else the records show is not sought
+    (verdict.stage, 0.8),
+    (account.stage, 0.9),
+    (advice.stage, 1.0),
+)
 
 
 def diagnose(question: Question) -> State:
@@ -70,7 +75,8 @@ def diagnose(question: Question) -> State:
     DataError where the data do not suffice for any statement.
     """
     state = baseline.stage(raw_data.stage(question))
-    for stage, done in QUICK if question.quick else FULL:
+    stages = QUICK if question.quick else FULL
+    for stage, done in VOID if state.void else stages:
         state = stage(state)
         question.progress(done)
     return state

@@ -99,6 +99,11 @@ class State:
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property
+    def void(self) -> bool:
+        """Whether a gate fired after which nothing else that the records show is to be trusted."""
+        return any(library()[one.cause].voids for _, one in self.firings)
+
+    @property
     def families(self) -> set[str]:
         """Families of the causes in the model; at one single rate all that widen the loop are one."""
         known = {term.cause.family for term in self.current.terms}
@@ -231,7 +236,7 @@ class State:
         A fault that was fitted is in doubt too where most of the error is unexplained, and where it could
         equally be something that the device does.
         """
-        if self.question.quick:
+        if self.question.quick or self.void:
             return []
         found = [one for one in self.findings if one.found and one.cause.corrects and not one.in_doubt]
         found = [one for one in found if not (one.cause.jagged and one.cause.id in self.background)]

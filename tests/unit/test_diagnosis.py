@@ -29,7 +29,7 @@ VOCABULARY = (
     *("delay", "output-lag", "field-lag", "rate-widening", "viscous", "creep", "thermal-drift"),
     *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
     *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
-    *("accommodation", "unlisted"),
+    *("accommodation", "unlisted", "clipped-input"),
 )
 # values that matter, and the values at which a cause does nothing
 STRENGTHS = {

@@ -1470,6 +1470,7 @@ def test_what_the_records_show_is_cited_as_seen(monkeypatch):
 
 
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
+CLIPPED = Firing("clipped-input", "gate", 0.8, "{u}")
 
 
 @pytest.mark.parametrize(
@@ -1483,6 +1484,7 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"verdict": "creep"}, "again"),
         ({"verdict": "current-tracking"}, "repair"),
         ({"verdict": "out-of-range", "lacks": ("rates",)}, "out of range"),
+        ({"verdict": "clipped-input", "firings": ((0, CLIPPED),), "lacks": ("rates",)}, "clipped input"),
         ({"verdict": "step", "findings": (_finding("step", 20.0),)}, "correct"),
         (
             {"verdict": "step", "findings": (_finding("step", 20.0), _finding("creep", 9.0))},

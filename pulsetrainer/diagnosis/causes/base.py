@@ -141,6 +141,7 @@ class Cause:
     feeds_back: ClassVar[bool] = False  # needs the output to compute the input
     by_contrast: ClassVar[bool] = False  # sought where the weights cannot hold it: see ``congruency``
     wild: ClassVar[bool] = False  # its gate finds samples that the other gates must not see
+    voids: ClassVar[bool] = False  # what else a record shows where its gate fires is not to be trusted
     blinded_by: ClassVar[tuple[str, ...]] = ()  # causes whose firing makes its gate blind
     leaves: ClassVar[tuple[str, ...]] = ()  # causes whose gates see what is left of it in a corrected record
     doubted: ClassVar[bool] = False  # others also set off its gate: it is asked again without what they add

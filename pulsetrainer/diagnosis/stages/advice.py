@@ -2,6 +2,7 @@
 
 The first of these that applies is the advice:
 
+- If the recorder clips the input, its range must be wider.
 - If the model as given is of the wrong kind, or of another condition, another model is needed.
 - If the device was still settling when the records began, it must rest first.
 - If no verdict is reached and what is left is the same in two records of one input, another kind of model is
@@ -25,6 +26,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis import equal_inputs
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.clipped_input import ClippedInput
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
@@ -57,13 +59,20 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 def stage(state: State) -> State:
     """Return the state with its advice."""
-    advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
+    advice = (
+        _of_the_recorder(state) or _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
+    )
     fastest = fastest_of(state, [one.cause.id for one in state.findings if one.found and one.in_doubt])
     if fastest is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
         figures = {"tau": fastest, "apart": step, "faster": as_fast_as(fastest)}
         advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
+
+
+def _of_the_recorder(state: State) -> Evidence | None:
+    clipped = [one for _, one in state.firings if one.cause == ClippedInput.id]
+    return Evidence("clipped input", figures={"rail": clipped[0].value}) if clipped else None
 
 
 def _of_the_conditions(state: State) -> Evidence | None:

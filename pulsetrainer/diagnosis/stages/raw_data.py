@@ -2,11 +2,12 @@
 
 Before any model is fitted, each record is checked for faults that no model can repair, sample by sample as it
 was measured. Such faults of the output are a cut at the end of its range, single wild samples, coarse steps,
-and jumps. Those of the input are a driver that does not follow its reference, and values outside the range
-that was identified. Each check is a *gate*, and is in the file of its cause; some gates also use the
-prediction of the model as given. A gate that fires makes a finding, and the samples that it names are left
-out of everything that follows. Their places are filled in by interpolation: some causes are filters, and wild
-samples must not reach these.
+and jumps. Those of the input are a recorder that clips it, a driver that does not follow its reference, and
+values outside the range that was identified. Each check is a *gate*, and is in the file of its cause; some
+gates also use the prediction of the model as given. A gate that fires makes a finding, and the samples that
+it names are left out of everything that follows. Their places are filled in by interpolation: some causes are
+filters, and wild samples must not reach these. Where the recorder clips the input, nothing follows but the
+answer: what else such a record shows may come from that.
 
 Only then is an input that was read in coarse steps interpolated between them. It is not if the output moves
 with the steps, which shows that the device saw them. The records are brought to even time steps, and a sharp

@@ -10,6 +10,8 @@ more than 0.2 % of the span. The verdict is the first of these that applies:
 - If there is neither: `inconclusive`, if the record could not have shown half a per cent of the span of a
   common cause; otherwise `none`.
 
+An input that its recorder clips comes before all of these: see `clipped-input`. Nothing else is then sought.
+
 Some findings are reported, but never become the verdict:
 
 - a hum no larger than the noise;
@@ -47,7 +49,7 @@ def stage(state: State) -> State:
     verdict = next((one.cause.id for one in sure), "none")
     if verdict == "none" and state.blind and not state.question.quick:
         verdict = "inconclusive"
-    if told.believed.unexplained and not state.question.quick:
+    if told.believed.unexplained and not state.void and not state.question.quick:
         verdict = next((one.cause.id for one in sure if one.cause.jagged), "unknown")
     return replace(state, findings=(*seen, *rest, *silent), verdict=verdict)
 
