@@ -345,12 +345,11 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     below.set_xlabel(label("time", "s"))
     unscored(above, waveform)
     unscored(below, waveform, name="")
-    before = int(np.argmax(waveform.scored))
-    if before:
-        middle = 0.5 * float(waveform.time_s[0] + waveform.time_s[before])
+    if not waveform.scored[0]:
         room(below)
         over = below.get_xaxis_transform()
-        below.text(middle, 0.98, "lead-in, which sets the memory", transform=over, ha="center", va="top")
+        begin = float(waveform.time_s[0])
+        below.text(begin, 0.98, " lead-in: sets the memory", transform=over, ha="left", va="top")
     panel.legend(loc="outside lower center", ncols=5, columnspacing=1.2)
 
 

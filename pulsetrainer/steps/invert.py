@@ -30,6 +30,8 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 _SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
 _AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
+_SEAM = 0.02  # of the height of a pulse: a smaller jump from its end to its beginning is not told ...
+_SEAM_STEPS = 3.0  # ... nor one of fewer of its own largest steps
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
@@ -125,7 +127,7 @@ def invert(
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
     if beat is None:
         say_if_several(shape, notes)  # after what can be refused: to find beats loads filters
-    notes += _stretched(shape, forces, (force_min, force_max), model)
+    notes += _stretched(shape, forces, (force_min, force_max), model) + _jumps(shape)
     progress(0.2)
     layout = laid_out(shape, part, forces, periods, rate_Hz, own_Hz)
     if chosen == "extended":
@@ -359,6 +361,16 @@ def _stretched(
     ends = with_unit(f"{forces[0]:.4g} .. {forces[1]:.4g}", model.output_unit)
     said = f"the values of {shape.name} go from {own[0]:.4g} to {own[1]:.4g}; they are stretched to {ends}"
     return [f"{said}: give `force_min` and `force_max` for other ends"]
+
+
+def _jumps(shape: Shape) -> list[str]:
+    """Say it where a pulse does not end where it begins, since one period follows another."""
+    value = shape.value
+    apart = abs(float(value[0] - value[-1]))
+    if apart <= max(_SEAM * float(np.ptp(value)), _SEAM_STEPS * float(np.abs(np.diff(value)).max())):
+        return []
+    said = f"{shape.name} ends at {value[-1]:.4g}, but begins at {value[0]:.4g}"
+    return [f"{said}: each period begins with a jump, unless the values lead back to the first"]
 
 
 def _compensated(part: Invertible, method: Inversion, layout: Layout) -> tuple[FloatArray, int]:

@@ -160,3 +160,12 @@ def test_ends_in_the_noise_of_the_input_are_told(noise):
     record = pt.Run(time_s=np.arange(u.size) / 500, input=u, output=0.1 * u, input_unit="V", output_unit="um")
     drive = pt.invert("normal", pt.identify(record, levels=8))
     assert any("include its noise of 0.02 V" in note for note in drive.notes) is bool(noise)
+
+
+@pytest.mark.parametrize(("ends_off", "said"), [(0.0, False), (0.01, False), (0.3, True)])
+def test_a_pulse_that_does_not_lead_back_to_its_beginning_is_told(ends_off, said):
+    """Shares of its height; one period follows another, with a jump between them."""
+    pulse = _pulse(1.2)
+    slope = ends_off * np.ptp(pulse.value) * np.arange(ROWS) / (ROWS - 1)
+    notes = pt.invert(replace(pulse, value=pulse.value + slope), _model()).notes
+    assert any("each period begins with a jump" in note for note in notes) is said
