@@ -86,6 +86,10 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     if one.name == "frequency" or (one.name == "rate" and _decades(one.at) > _MANY):
         moving = float(np.abs(one.at[_moves(one.at)]).min(initial=np.inf))
         axes.set_xscale("log") if one.name == "frequency" else axes.set_xscale("symlog", linthresh=moving)
+        if one.name == "rate":  # where the axis is linear, a tick would touch that of zero
+            ends = axes.get_xlim()
+            axes.set_xticks([x for x in axes.get_xticks() if x == 0 or abs(x) >= moving])
+            axes.set_xlim(ends)
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # powers of ten would need mathtext
         axes.xaxis.set_minor_formatter(NullFormatter())
     if one.name == "direction":
