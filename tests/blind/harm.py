@@ -42,7 +42,7 @@ OF_THE_MEASUREMENT = (
     "clock-skew",
 )
 # two records, or no effect on the device
-NOT_JUDGED = ("condition-change", "current-tracking", "out-of-range")
+NOT_JUDGED = ("condition-change", "current-tracking", "out-of-range", "clipped-input")
 
 
 def drive(high: float, rng: np.random.Generator) -> np.ndarray:

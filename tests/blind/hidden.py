@@ -88,6 +88,7 @@ LIBRARY = {
     # what a driver delivers whose supply is too low; on the bench itself the firmware stops such a play
     "current-tracking": lambda r, _: ({}, {"top": r.uniform(1.24, 1.44)}),
     "out-of-range": lambda r, _: ({}, {"high": r.uniform(1.2, 1.4)}),
+    "clipped-input": lambda r, _: ({}, {"size": r.uniform(1.1, 1.4)}),
 }
 LOWEST_DRIFT = -0.006  # N/s: with more the zero falls below what the device takes for a sound sensor
 SETTINGS = ("seed", "noise-seed", "noise")
@@ -100,7 +101,7 @@ FAMILIES = (
 )
 # Not in pairs: a second record, effects that take data away, and a feedback that the weights of this
 # bench can hold as a whole (what is left of it is below a fortieth of a per cent of the span).
-ALONE = ("condition-change", "out-of-range", "current-tracking", "load-dependence")
+ALONE = ("condition-change", "out-of-range", "clipped-input", "current-tracking", "load-dependence")
 
 
 @dataclass(frozen=True)
@@ -215,6 +216,9 @@ def size_percent(case: Case, data: Data) -> float:
     if "current-tracking" in case.causes:  # the device is healthy: its driver is not
         return float(100 * np.sqrt(np.mean((last.input - last.reference) ** 2)) / data.played)
     difference = last.output[:count] - twin.output[:count]
+    if "clipped-input" in case.causes:  # the device is healthy: its recorder is not
+        lost = twin.input[:count] - last.input[:count]
+        return float(100 * np.sqrt(np.mean(lost**2)) / data.played)
     if "out-of-range" in case.causes:
         outside = np.maximum(last.input - data.high, 0.0)
         return float(100 * np.sqrt(np.mean(outside**2)) / data.played)
@@ -240,4 +244,5 @@ def _spoilt(case: Case, record: Record) -> Record:
             np.sin(2 * np.pi * t / 17) > 0.3
         )
         y = y + 0.25 * burst * np.sin(2 * np.pi * t / 3.1)
-    return replace(record, output=y)
+    top = case.truth.get("clipped-input", {}).get("size", np.inf)
+    return replace(record, input=np.minimum(record.input, top), output=y)

@@ -15,7 +15,8 @@ LEAST_PERCENT = 0.5  # size of an effect from which on the targets hold
 SWEPT = tuple(
     name
     for name in hidden.LIBRARY
-    if name not in ("saturation", "outliers", "current-tracking", "out-of-range", "resonance")
+    if name
+    not in ("saturation", "outliers", "current-tracking", "out-of-range", "clipped-input", "resonance")
 )
 
 
@@ -85,7 +86,15 @@ def words(rows) -> str:
     return "\n".join(lines)
 
 
-_GATED = ("saturation", "quantisation", "outliers", "stick-slip", "current-tracking", "out-of-range")
+_GATED = (
+    "saturation",
+    "quantisation",
+    "outliers",
+    "stick-slip",
+    "current-tracking",
+    "out-of-range",
+    "clipped-input",
+)
 
 
 def _median(values) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import form_devices
@@ -162,7 +163,7 @@ def test_nothing_else_is_sought_in_such_a_record(quick):
     swing = np.repeat([1.0, 0.7, 1.0, 0.9, 0.5], 2 * SAMPLES)
     u = swing * SHAPES["triangle"]
     y = _noisy(_device("lagging")(u), 0.2)
-    run = _run(np.minimum(u, 0.8), y)
+    run = replace(_run(np.minimum(u, 0.8), y), reference=u)  # which the driver follows all the while
     model = pt.identify(run)
     found = pt.diagnose(run, model, quick=quick)
     assert found.verdict == "clipped-input"

@@ -24,6 +24,7 @@ class CurrentTracking(OfTheRecord):
     excitation = "a recorded reference"
     order = 4
     family = "current-tracking"
+    blinded_by = ("clipped-input",)  # what its recorder does not see is no fault of the driver
     size = "from the {input} to its reference; one sample in a hundred is further off"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "one sample in a hundred of the input is {worst:.3g}{in_u} or more away from its reference"
