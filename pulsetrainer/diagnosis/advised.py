@@ -320,8 +320,9 @@ class Bench:
 
 def _set(value: float, to_whole: Callable[[float], int] = round) -> float:
     """Return a rate or a time as somebody would set it: 40 for 39.9."""
-    step = 10.0 ** (math.floor(math.log10(value)) + 1 - LIMITS.set_digits)
-    return float(f"{to_whole(round(value / step, 6)) * step:.{LIMITS.set_digits}g}")
+    step = float(f"1e{math.floor(math.log10(value)) + 1 - LIMITS.set_digits}")
+    whole = to_whole(round(value / step, LIMITS.plain_digits))  # rounding is no reason to go up
+    return float(f"{whole * step:.{LIMITS.set_digits}g}")
 
 
 def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str] = ()) -> str:

@@ -27,10 +27,11 @@ AGAIN, DIFFERS = "comes again", "differs"
 
 def told(state: State) -> list[Evidence]:
     """Return what the two records whose inputs are most alike say of what is left, or nothing."""
-    if state.question.quick or not state.unexplained:
+    records = state.problem.records
+    if len(records) == 1 or state.question.quick or not state.unexplained:
         return []
     bins = state.problem.bins
-    inputs = bins.average([record.input for record in state.problem.records])
+    inputs = bins.average([record.input for record in records])
     there, left = np.ones(bins.count), state.current.residual
     pairs = []
     for pair in combinations(range(len(bins.number)), 2):

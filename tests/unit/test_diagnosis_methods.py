@@ -847,6 +847,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
             "refitted",
             "left_out",
             "mains",
+            "rail",
         ],
         1.25,
     )
@@ -1006,7 +1007,9 @@ def test_what_can_be_done_now_comes_before_what_to_record(kind):
 def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
     """`next` sent to the bench, or to use the model as it is, and `then` to correct the recording."""
     names = (*["heating"][: kind == "tied"], "periodic", "clock-skew")
-    one = Evidence(kind, figures={"there": 1, "here": 1, "rest": 1, "matters": 1, "times": 2}, names=names)
+    one = Evidence(
+        kind, figures={"there": 1, "here": 1, "rest": 1, "matters": 1, "times": 2, "rail": 1}, names=names
+    )
     said = advised.advice(one, advised.Bench(Scale(), "A"), command, ["outliers", "periodic"])
     if command == "correct":
         assert "pulsetrainer correct" in said
