@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pulsetrainer.core.plane import FloatArray, finite_vector, float_array
+from pulsetrainer.core.plane import BoolArray, FloatArray, finite_vector, float_array
 from pulsetrainer.errors import ArgumentError
+
+_NEARLY_ALL = 0.9  # of the samples
 
 
 class TargetError(NamedTuple):
@@ -38,6 +40,15 @@ def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> TargetError
         )
     size = np.abs(error) * (100.0 / full)
     return TargetError(float(size.mean()), float(size.max()), root_mean_square(size))
+
+
+def lacking(target: FloatArray, measured: FloatArray, at: BoolArray) -> float:
+    """How far ``measured`` (..., n) stays below ``target`` (n,) in the samples ``at`` (n,); NaN: none is.
+
+    The largest tenth does not count: it is noise.
+    """
+    lack = (target - measured)[..., at]
+    return float(np.nanquantile(lack, _NEARLY_ALL)) if np.isfinite(lack).any() else float("nan")
 
 
 def root_mean_square(values: FloatArray) -> float:

@@ -130,8 +130,8 @@ ADVICE: Mapping[str, str] = {
     ),
     "extend": (
         "Extend the model with what was found, then compare both models on another recording, one that was "
-        "not fitted: pulsetrainer evaluate. If you have one now, extend with --verify and it: what does not "
-        "hold there is not added."
+        "not fitted: pulsetrainer evaluate. If you have that recording already, give it to extend "
+        "(--verify): only what holds there too is then added."
     ),
     "extend, correct": (
         "Extend the model with what was found, then compare both models on another recording, one that was "
@@ -321,7 +321,7 @@ class Bench:
 def _set(value: float, to_whole: Callable[[float], int] = round) -> float:
     """Return a rate or a time as somebody would set it: 40 for 39.9."""
     step = float(f"1e{math.floor(math.log10(value)) + 1 - LIMITS.set_digits}")
-    whole = to_whole(round(value / step, LIMITS.plain_digits))  # rounding is no reason to go up
+    whole = to_whole(round(value / step, LIMITS.told_digits))  # rounding is no reason to go up
     return float(f"{whole * step:.{LIMITS.set_digits}g}")
 
 

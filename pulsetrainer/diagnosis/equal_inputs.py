@@ -11,6 +11,7 @@ something that was not recorded.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -27,24 +28,9 @@ AGAIN, DIFFERS = "comes again", "differs"
 
 def told(state: State) -> list[Evidence]:
     """Return what the two records whose inputs are most alike say of what is left, or nothing."""
-    records = state.problem.records
-    if len(records) == 1 or state.question.quick or not state.unexplained:
+    if len(state.problem.records) == 1 or state.question.quick or not state.unexplained:
         return []
-    bins = state.problem.bins
-    inputs = bins.average([record.input for record in records])
-    there, left = np.ones(bins.count), state.current.residual
-    pairs = []
-    for pair in combinations(range(len(bins.number)), 2):
-        if bins.width[pair[0]] != bins.width[pair[1]]:
-            continue
-        (u1, u2), (r1, r2), (n1, n2) = ([bins.even(one, k) for k in pair] for one in (inputs, left, there))
-        first, second = _aligned(u1, u2)
-        both = (n1[first] > 0) & (n2[second] > 0)
-        if np.count_nonzero(both) < LIMITS.half * max(u1.size, u2.size):
-            continue
-        apart = root_mean_square((u1[first] - u2[second])[both])
-        pairs.append((apart, r1[first][both], r2[second][both]))
-    same = [pair for pair in pairs if pair[0] <= LIMITS.same_input]
+    same = [pair for pair in _pairs(state) if pair[0] <= LIMITS.same_input]
     if not same:
         return []
     _, one, other = min(same, key=lambda pair: pair[0])
@@ -52,6 +38,21 @@ def told(state: State) -> list[Evidence]:
     if share >= LIMITS.comes_again:
         return [Evidence(AGAIN, figures={"share": PERCENT * share})]
     return [Evidence(DIFFERS, figures={"share": PERCENT * (1.0 - share)})] if share < LIMITS.half else []
+
+
+def _pairs(state: State) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    """Yield of every two records, laid over each other, how far their inputs are apart, and what is left."""
+    bins = state.problem.bins
+    inputs = bins.average([record.input for record in state.problem.records])
+    of_all = (inputs, state.current.residual, np.ones(bins.count))
+    for one, other in combinations(range(len(bins.number)), 2):
+        u1, left1, there1 = (bins.even(values, one) for values in of_all)
+        u2, left2, there2 = (bins.even(values, other) for values in of_all)
+        first, second = _aligned(u1, u2)
+        both = (there1[first] > 0) & (there2[second] > 0)
+        if np.count_nonzero(both) >= LIMITS.half * max(u1.size, u2.size):
+            apart = root_mean_square((u1[first] - u2[second])[both])
+            yield apart, left1[first][both], left2[second][both]
 
 
 def common(first: FloatArray, second: FloatArray, noise: float) -> float:

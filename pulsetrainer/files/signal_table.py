@@ -65,8 +65,8 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
 
 def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, FloatArray]:
     """Return a table, its first column as seconds (n,), and its second one (n,); raises as ``read_table``."""
-    from pulsetrainer.files.run_from_table import seconds  # noqa: PLC0415
     from pulsetrainer.files.table import read_table  # noqa: PLC0415
+    from pulsetrainer.files.time_column import seconds  # noqa: PLC0415
 
     table = read_table(path, lambda head: range(min(2, len(head.names))))
     if len(table.names) < 2:

@@ -14,6 +14,7 @@ import numpy as np
 from pulsetrainer.artefacts import Evaluation, Model, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
+from pulsetrainer.core.metrics import lacking
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.report.facts import coil_words, loop_words, minor_words, run_facts, span_words
 from pulsetrainer.report.names import digits, split, told
@@ -24,7 +25,6 @@ _MORE_BEFORE = 1.05  # times the full force, in the strokes before the pulse: sa
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
 _ROUNDING = 1e-6  # of the highest current
 _SHORT = 0.01  # of the full force: what a warm coil lacks at the top of a pulse is said
-_NEARLY_ALL = 0.9  # of the samples at the highest current
 _SURELY = 0.98  # of the force at the highest current: a coil warms on
 _WORSE = 1.0  # per cent of the rms error of the first model: the figures of the table do not show less
 _LARGE = 100.0  # of a unit: of more, three decimals tell what no sensor does
@@ -173,13 +173,11 @@ def _too_warm(made: Playback) -> dict[str, str]:
     highest = operator_of(model).high
     nearly = (1.0 - _ROUNDING) * highest
     short = drive.scored & np.any(sent >= nearly, axis=0) & (drive.compensated < nearly)
-    lack = drive.target[short] - made.compensated.output[:, short]
-    if not np.isfinite(lack).any():
+    lack = lacking(drive.target, made.compensated.output, short)
+    if not lack > _SHORT * drive.full_force:
         return {}
     wanted = float(drive.target[short].max())
-    top = wanted - float(np.nanquantile(lack, _NEARLY_ALL))  # the largest one is noise
-    if wanted - top <= _SHORT * drive.full_force:
-        return {}
+    top = wanted - lack
     told = f"{top:.1f} of {wanted:.1f} {drive.output_unit} at {highest:g} {drive.input_unit}"
     return {"too warm": f"{told}, the highest current: invert with --force-max {_SURELY * top:.3g}"}
 

@@ -48,3 +48,13 @@ def test_squares_beyond_all_numbers_are_infinite():
     """Without a warning."""
     assert metrics.root_mean_square(np.asarray([3.0, 4.0])) == pytest.approx(np.sqrt(12.5))
     assert metrics.root_mean_square(np.asarray([1e200, 0.0])) == np.inf
+
+
+def test_what_an_output_lacks_is_that_of_nine_samples_in_ten():
+    """Of those that are asked for, of all repeats; a lost sample does not count, and none tell nothing."""
+    target = np.arange(11.0)
+    measured = np.stack((target - np.arange(11.0), target - np.arange(11.0)))
+    measured[1] = np.nan
+    assert metrics.lacking(target, measured, np.ones(11, bool)) == pytest.approx(9.0)
+    assert metrics.lacking(target, measured, target < 1) == 0.0
+    assert np.isnan(metrics.lacking(target, measured, np.zeros(11, bool)))

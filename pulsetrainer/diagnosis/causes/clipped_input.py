@@ -34,7 +34,7 @@ _SURE = 5.0  # standard errors, both of the rise and of the fall: noise makes ne
 _RISE = 0.1  # of what the output does in half as long before the rest: less is no course that goes on
 _FALL = 0.025  # ... and after it: just after a turn most devices are slow
 _BENT = 0.5  # of the hump: a hum bends the other way before it
-_MOST = 3.0  # times that: more is no course that goes on, but the ringing of a device that has stopped
+_MOST = 3.0  # times what it does before or after: more is the ringing of a device that has stopped
 _STILL = 0.25  # of the fall must come at the end of the rest: what rings or relaxes has calmed down
 _STEPS = 3.0  # steps of the input: a coarse converter makes a turn look like a rest, with a hump of one
 _TURN = 8.0  # times the noise of the input: a turn may look like a rest within it, and so may the way to it
@@ -66,17 +66,14 @@ class ClippedInput(OfTheRecord):
     family = "clipped-input"
     size = "{input} at which it is clipped"
     voids = True
+    _meanwhile = (
+        "in {count:.0f} places, while the {output} goes on and comes back before the {input} moves: the "
+        "recorder clips the {input} there. What else the recordings show may come from that, so nothing else "
+        "was sought"
+    )
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": (
-            "the {input} rests at {rail:.4g}{in_u} in {count:.0f} places, while the {output} goes on and "
-            "comes back before the {input} moves: the recorder clips the {input} there. What else the "
-            "recordings show may come from that, so nothing else was sought"
-        ),
-        "both": (
-            "the {input} rests at {rail:.4g} or {other:.4g}{in_u} in {count:.0f} places, while the {output} "
-            "goes on and comes back before the {input} moves: the recorder clips the {input} there. What "
-            "else the recordings show may come from that, so nothing else was sought"
-        ),
+        "gate": f"the {{input}} rests at {{rail:.4g}}{{in_u}} {_meanwhile}",
+        "both": f"the {{input}} rests at {{rail:.4g}} or {{other:.4g}}{{in_u}} {_meanwhile}",
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -1,0 +1,224 @@
+"""The time of a table: the rate of the file, a column that is called time, or none.
+
+Time stamps are taken as they are, in the unit that the heading, or their size, says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from pulsetrainer.artefacts import FloatArray
+from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
+from pulsetrainer.errors import DataError
+from pulsetrainer.files.csv_dialect import cell_at, column_words
+from pulsetrainer.files.table import Table
+from pulsetrainer.files.time_stamps import is_since_1970, stated_rate, unit_of_count
+
+LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
+ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the first: it has no name
+_TIME_NAMES = frozenset(
+    ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
+)
+_DAY_S = 86_400.0
+_COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
+_EXACT = 0.02  # of a step: what rounding of large stamps may be off by
+_IN_SECONDS = " in s"  # the heading that `diagnose` asks for: whole seconds under it count no rows
+_SLOW_S, _MANY = 1.0, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
+_SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
+_USUAL_STEP = 1.0  # times the usual step: so far another step may be off
+_COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
+_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
+
+
+class Time(NamedTuple):
+    """The time of a record: s (n,), where it comes from, and what there is to say of that."""
+
+    s: FloatArray | None
+    words: str
+    notes: tuple[str, ...] = ()
+
+
+def time_of(
+    table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None, whole: Table
+) -> Time:
+    """Return the time by a rate, in a column, or, where neither is given, what the file has by itself.
+
+    ``whole`` is the table before rows were left out: it tells whether a column counts them.
+    """
+    rate_Hz = table.rate_Hz if rate_Hz is None and time is None else rate_Hz
+    if rate_Hz is not None:
+        return Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz")
+    if time is None:
+        place = own_column(table, {table.index(name) for name in wanted})
+        if place is None:
+            other = "other " * any(is_called_time(table.names[table.index(name)]) for name in wanted)
+            lack = f"{table.path} has no {other}time column"
+            return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
+        time = table.names[place]
+        # no row is counted in ms; the licensed t_s of seconds does count rows
+        counts = _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s")
+        if counts and not time.endswith(_IN_SECONDS):
+            lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
+            return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
+    heading = table.names[table.index(time)]
+    unit, notes = _taken_as(table, heading)
+    table = replace(table, units={**table.units, heading: unit}) if unit else table
+    words = f"time from {split_unit(heading)[0]} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
+    stamps, again = _begun_again(table.check_finite(time, remedy=LEAVE_OUT), unit or "s")
+    if again:
+        table = replace(table, columns={**table.columns, heading: stamps})
+        notes = (*notes, f"the time of {table.path} {again}")
+    time_s = seconds(table, time, of_record=True)
+    step = float(np.median(np.diff(time_s)))
+    if not unit and step >= _SLOW_S and time_s.size >= _MANY:
+        said = f"the samples of {table.path} are {step:g} s apart if its time is in seconds, as assumed"
+        notes = (*notes, f"{said} (if it is in ms, write the heading as '{heading} [ms]')")
+    if np.spacing(np.abs(time_s[0])) > _EXACT * step:
+        notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
+    return Time(time_s, words, notes)
+
+
+def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of a column of time, by its heading or its size, and what there is to say of that."""
+    unit, first = _unit_of_time(table, heading), float(table.columns[heading][0])
+    by_size = "" if unit else unit_of_count(first, heading)
+    stamped = is_since_1970(first, unit) and not _as_written(table, heading, 0, "")
+    if by_size or stamped:
+        told = "days of a spreadsheet" if by_size == "d" else f"{by_size or unit or 's'} since 1970"
+        return by_size or unit, (f"the column {heading} of {table.path} is taken as {told}, by its size",)
+    if not unit and _unknown_unit(table, heading):
+        said = f"the heading {heading!r} of {table.path} has no known unit: taken as seconds"
+        return unit, (f"{said} (write the unit in brackets, such as 't [min]')",)
+    return unit, ()
+
+
+def _counted(table: Table, lack: str, remedy: str, *, whole: bool) -> Time:
+    """Return the time of counted rows at the rate that the comments state, else none."""
+    stated = stated_rate(table.comments) if whole else None
+    if stated is None:
+        return Time(None, "no time", (f"{lack}: only the order of the samples is known ({remedy})",))
+    rate_Hz, said = stated
+    note = f"{lack}: the rate is that of its comment {said!r}"
+    return Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz", (note,))
+
+
+def _begun_again(stamps: FloatArray, unit: str) -> tuple[FloatArray, str]:
+    """Return times (n,) that go on where a day or a counter began again, and what was done; empty: nothing.
+
+    A step back is midnight where with a day more it is a usual step of the record.
+    """
+    step = np.diff(stamps)
+    back = np.flatnonzero(step < 0)
+    whole, said = (_DAY_S, "goes past midnight: a day is added from there on")
+    if unit in _COUNTERS:
+        whole, said = _COUNTER, "begins again, as a counter of 32 bits does: 2^32 is added from there on"
+    elif unit != "s":
+        return stamps, ""
+    if not back.size or stamps.min() < 0 or stamps.max() >= whole:
+        return stamps, ""
+    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+    if np.any(np.abs(step[back] + whole - usual) > _USUAL_STEP * usual):
+        return stamps, ""
+    return stamps + whole * np.cumsum(np.concatenate(([0.0], step < 0))), said
+
+
+def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
+    """Return a column as strictly increasing seconds (n,).
+
+    Rows of a record may be left out, and its time is in seconds where its unit is not known.
+
+    DataError where its unit is none of time, a value is not finite, or it does not increase: the line is
+    named.
+    """
+    unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
+    if unit not in SECONDS:
+        raise DataError(
+            f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
+            "or d",
+            hint="convert it to seconds" + ", choose another `time` column, or give a `rate_Hz`" * of_record,
+        )
+    stamps = table.check_finite(name, remedy=LEAVE_OUT) if of_record else table.check_finite(name)
+    time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]
+    back = np.flatnonzero(time_s[1:] <= time_s[:-1])
+    if back.size:
+        row = int(back[0]) + 1
+        this, before = (
+            _as_written(table, name, k, f"{stamps[k]:.15g} {unit or 's'}") for k in (row, row - 1)
+        )
+        if stamps[row] != stamps[row - 1]:
+            hint = "sort the rows"
+            other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
+        elif all(column[row] == column[row - 1] for column in table.columns.values()):
+            hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
+        else:
+            hint = "its time stamps are repeated, or rounded too coarsely: write them with more digits"
+            other = ", or give a `rate_Hz` instead of the time"
+        raise DataError(
+            f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
+            f"{this} after {before} ({counted(back.size, 'such row')})",
+            hint=hint + other * of_record,
+        )
+    return time_s
+
+
+def rates_of(table: Table, name: str) -> tuple[float | None, float | None]:
+    """Return the rate of a column of time, Hz, by its median step and by its length; None: it is no time."""
+    stamps = table.columns[name]
+    unit = _unit_of_time(table, name)
+    increasing = bool(stamps.size > 1 and np.all(np.isfinite(stamps)) and np.all(np.diff(stamps) >= 0))
+    if not unit or unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
+        return None, None
+    median, mean = float(np.median(np.diff(stamps))), float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    # stamps that are rounded repeat themselves: the mean alone tells
+    return 1.0 / (SECONDS[unit] * (median or mean)), 1.0 / (SECONDS[unit] * mean)
+
+
+def own_column(table: Table, used: Collection[int]) -> int | None:
+    """Return the place of the column that may be the file's own time; None where there is none."""
+    if table.rate_Hz is not None:
+        return None
+    words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
+    candidates = [k for k, name in enumerate(table.names) if is_called_time(name)]
+    if table.shifts:  # of a text, where columns have an order: the first, or behind a row's number or date
+        passed = words[0] in ROW_NAMES or table.names[0] in table.text_names
+        candidates = [*candidates, 0] if passed else [0]
+    free = (k for k in candidates if k not in used and table.names[k] not in table.text_names)
+    return next(free, None)
+
+
+def is_called_time(heading: str) -> bool:
+    """Return whether a heading is a name of time, with or without a unit."""
+    return split_unit(heading)[0].rpartition(".")[2].lower() in _TIME_NAMES
+
+
+def _unit_of_time(table: Table, name: str) -> str:
+    """Return the unit of a column of time, empty where the header says none; ``min`` may be all of it."""
+    alone = symbol_of(table.names[table.index(name)])
+    return table.unit(name) or (alone if alone in SECONDS else "")
+
+
+def _unknown_unit(table: Table, name: str) -> str:
+    """Return what the heading of a time says in the place of a unit, empty where it is a name alone."""
+    heading = table.names[table.index(name)]
+    bare, _, behind = heading.rpartition("_")
+    return claimed_unit(heading) or (behind if bare.lower() in _TIME_NAMES else "")
+
+
+def _just_counts(values: FloatArray) -> bool:
+    """Whether a column is 0, 1, 2, or 1, 2, 3, wherever something stands in it."""
+    if values.size < _COUNTED or values[0] not in (0.0, 1.0):
+        return False
+    parts = ((k, values[k : k + _BLOCK]) for k in range(0, values.size, _BLOCK))
+    return all(
+        bool(np.all((part == values[0] + np.arange(k, k + part.size)) | np.isnan(part))) for k, part in parts
+    )
+
+
+def _as_written(table: Table, name: str, row: int, value: str) -> str:
+    """Return a time as it stands in the file where it is a time of day or a date there, else its value."""
+    cell = cell_at(table.path, table.line_of(row), table.index(name)) if table.shifts else ""
+    return cell if ":" in cell else value
