@@ -80,9 +80,13 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
     axes = figure.add_subplot()
     known = np.isfinite(one.before)
-    axes.plot(one.at[known], one.before[known], "o-", color=VERMILION, markersize=3, label="without causes")
-    if extended:
-        axes.plot(one.at[known], one.after[known], "s-", color=BLUE, markersize=3, label="with them")
+    # between two directions there is nothing: no line joins them
+    joined, size = ("", 6) if one.name == "direction" else ("-", 3)
+    for values, marker, color, name in (
+        (one.before, "o", VERMILION, "without causes"),
+        (one.after, "s", BLUE, "with them"),
+    )[: 1 + extended]:
+        axes.plot(one.at[known], values[known], marker + joined, color=color, markersize=size, label=name)
     if one.name == "frequency" or (one.name == "rate" and _decades(one.at) > _MANY):
         moving = float(np.abs(one.at[_moves(one.at)]).min(initial=np.inf))
         axes.set_xscale("log") if one.name == "frequency" else axes.set_xscale("symlog", linthresh=moving)
@@ -182,6 +186,6 @@ def ranking(found: Diagnosis) -> Figure:
     axes.set_xticks([tick for tick in ticks if tick <= ends])
     axes.spines["bottom"].set_bounds(0.0, ends)
     axes.set_title("Causes, and whether each was found")
-    axes.set_xlabel("explains [% of the squared error beyond noise]")
+    axes.set_xlabel("explains [% of the squared error beyond noise]", loc="left")
     axes.grid(visible=False, axis="y")
     return figure

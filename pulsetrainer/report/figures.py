@@ -174,8 +174,10 @@ def evaluation(errors: Evaluation) -> Figure:
         )
     if not pulses and len(errors.models) == 1:
         return prediction(errors.models[0], quantity=quantity)
-    figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
-    cells = figure.subfigures(rows, 2, squeeze=False)
+    tall = 1.25 if any(len(played) > 1 for played in pulses.values()) else 1.0  # legends of several lines
+    figure = _sheet(2 * COLUMN_IN, tall * _ROW_IN * rows)
+    widths = (1.0, 1.0) if pairs else (1.2, 1.0)  # a loop is a square
+    cells = figure.subfigures(rows, 2, squeeze=False, width_ratios=widths)
     for row, played in zip(cells, pulses.values(), strict=False):
         if len(played) > 1:
             panels.methods(row[0], played, among)

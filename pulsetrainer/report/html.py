@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, FloatArray, Model, ModelEvaluation, WaveformEvaluation
@@ -34,6 +34,7 @@ from pulsetrainer.report.results import worse
 from pulsetrainer.report.style import label
 
 _UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
+_OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,9 +193,13 @@ def environment() -> Environment:
     return made
 
 
-def unbroken(text: str) -> str:
-    """Return a text in which no line breaks between a number and its unit; markup stays markup."""
-    return type(text)(_UNIT.sub("\N{NO-BREAK SPACE}", text))
+def unbroken(text: str) -> Markup:
+    """Return a text in which no line breaks within an option or between a number and its unit.
+
+    Markup stays markup. The dashes stay as they are typed, so that an option can be copied.
+    """
+    joined = _UNIT.sub("\N{NO-BREAK SPACE}", str(escape(text)))
+    return Markup(_OPTION.sub(r'<span class="option">\g<0></span>', joined))  # noqa: S704 escaped above
 
 
 def _made_by(text: str) -> tuple[str, str]:

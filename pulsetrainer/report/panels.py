@@ -318,15 +318,15 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequen
         beat = slice(0, one.target.size // beats(one.target))
         shown = f"{name}: {digits(drive.hysteresis_percent)}"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="W")  # begins where the text below it begins
     axes.set(xlabel=label("target", first.output_unit), ylabel=label("force", first.output_unit))
-    title = f"{first.name}{'' if several else f', {first.inversion}'}: one beat"
+    title = f"{first.name}, {'force against target' if several else first.inversion}"
     axes.set_title(textwrap.fill(title, _SQUARE_TITLE, break_on_hyphens=False))
     step = float(np.diff(MaxNLocator(7, steps=(1, 2, 5, 10)).tick_values(*ends))[0])
     for axis in (axes.xaxis, axes.yaxis):  # equal scales have equal ticks
         axis.set_major_locator(MultipleLocator(step))
     # outside, since inside a loop would run through
-    panel.legend(loc="outside lower center", title=str(NAMES["hysteresis_percent"]), alignment="left")
+    panel.legend(loc="outside lower left", title=str(NAMES["hysteresis_percent"]), alignment="left")
 
 
 def drives(panel: FigureBase, waveform: Waveform) -> None:
@@ -340,7 +340,7 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     above.set_ylabel(label(pressed or quantity_of(waveform.output_unit), waveform.output_unit))
     above.set_title(f"{titled(waveform)}: what is asked for, and the drive")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
-    trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
+    trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label="compensated")
     below.set_ylabel(label(f"drive: {driven or quantity_of(waveform.input_unit)}", waveform.input_unit))
     below.set_xlabel(label("time", "s"))
     unscored(above, waveform)
