@@ -23,6 +23,7 @@ ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the f
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
+_CLOCKS = frozenset(["utc", "gmt", "local", "epoch", "unix"])  # whose time it is, where its unit would stand
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
@@ -197,8 +198,8 @@ def is_called_time(heading: str) -> bool:
 
 def _unit_of_time(table: Table, name: str) -> str:
     """Return the unit of a column of time, empty where the header says none; ``min`` may be all of it."""
-    alone = symbol_of(table.names[table.index(name)])
-    return table.unit(name) or (alone if alone in SECONDS else "")
+    alone, unit = symbol_of(table.names[table.index(name)]), table.unit(name)
+    return ("" if unit.lower() in _CLOCKS else unit) or (alone if alone in SECONDS else "")
 
 
 def _unknown_unit(table: Table, name: str) -> str:

@@ -145,10 +145,14 @@ def _jumps(run: Run) -> list[str]:
         found += [(part.start or 0) + int(k) + 1 for k in at]
     if not found:
         return []
-    places = [f"sample {k + 1}" if run.time_s is None else with_seconds(float(run.time_s[k])) for k in found]
+    if run.time_s is None:
+        where = "at " + ", ".join(f"sample {k + 1}" for k in found)
+    else:  # counted from its beginning: a time stamp may hold a date
+        since = run.time_s[found] - run.time_s[0]
+        where = ", ".join(map(with_seconds, since.tolist())) + " after its first sample"
     share = 100.0 * abs(float(run.input[found[0]] - run.input[found[0] - 1])) / reach
-    said = f"the input of {run.signal} jumps by {share:.0f} % of its range from one sample to the next, at "
-    return [f"{said}{', '.join(places)}: if the device was not driven so, a piece of the record is missing"]
+    said = f"the input of {run.signal} jumps by {share:.0f} % of its range from one sample to the next, "
+    return [f"{said}{where}: if the device was not driven so, a piece of the record is missing"]
 
 
 def _notes_on_time(name: str, report: Report) -> list[str]:

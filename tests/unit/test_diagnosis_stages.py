@@ -1428,13 +1428,20 @@ def test_the_account_says_what_is_left_before_and_after(monkeypatch):
     assert (extended.kind, extended.figures) == ("extended", {"left": pytest.approx(2.0)})
 
 
+def test_that_a_large_effect_would_have_shown_is_no_news(monkeypatch):
+    """A tenth of the span, and no more."""
+    told = _accounted(monkeypatch, verdict="none", detectable={"creep": 0.099, "step": 0.101})
+    assert [one.figures for one in told if one.kind == "would have shown"] == [{"creep": pytest.approx(9.9)}]
+
+
 @pytest.mark.parametrize(
-    ("left", "squares", "said"),
-    [((2.0, 3.02), 101.0, True), ((2.0, 3.0), 101.0, False), ((2.0, 3.02), 100.0, False)],
+    ("left", "relevant", "said"),
+    [((2.0, 3.02), 4.01, True), ((2.0, 3.0), 4.01, False), ((2.0, 3.02), 3.99, False)],
 )
 @pytest.mark.parametrize("name", ["none", "unknown"])
-def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, squares, said, name):
-    """By half, and only where nothing was named and more is left than the floor of 100."""
+def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, relevant, said, name):
+    """By half, and only where nothing was named and more than noise is left: four relevant falls."""
+    squares = FLOOR.squares + relevant * FLOOR.relevant
     found = _accounted(monkeypatch, left=left, squares=squares, extended=True, verdict=name)
     largest = [one for one in found if one.kind == "largest"]
     assert bool(largest) is said

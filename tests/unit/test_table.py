@@ -456,6 +456,7 @@ def test_counts_since_a_date_are_told_by_their_size(table, heading, first, step,
         ("ts_ms", "1750000000000", "ms since 1970"),
         ("unix", "1750000000", "s since 1970"),
         ("time_utc", "1750000000", "s since 1970"),
+        ("time (UTC)", "1750000000", "s since 1970"),
         ("t_us", "1750000000", ""),  # half an hour
         ("when", "2026-11-27 10:00:00", ""),  # nobody has to guess
     ],

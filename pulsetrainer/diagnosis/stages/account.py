@@ -47,10 +47,10 @@ def stage(state: State) -> State:
                 np.sqrt(state.current.squares - state.floor_left.squares) / np.sqrt(state.floor.count)
             )
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
-    shown = {k: PERCENT * v for k, v in state.detectable.items() if v < 1.0}  # larger ones are none
+    shown = {k: PERCENT * v for k, v in state.detectable.items() if v < LIMITS.told_effect}
     if state.verdict in ("none", "inconclusive") and shown:
         said.append(Evidence("would have shown", figures=shown))
-    if state.verdict in ("none", "inconclusive", "unknown") and state.current.squares > state.floor.squares:
+    if state.verdict in ("none", "inconclusive", "unknown") and not state.is_whole(state.current):
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
         figures = {"white": percent * state.floor.white, "times": state.floor.slow}
