@@ -84,10 +84,12 @@ def fit(
     smoothing: Smoothing = "auto",
     form: Form | Literal["auto"] = "direct",
     kept: Kept = None,
+    levels: Plane | None = None,
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
-    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
+    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output. They are
+    chosen by the records, unless the ``levels`` are given.
 
     Errors are those of ``identification.identify``; ArgumentError also for relays, or the alternating method,
     with another form than direct.
@@ -95,12 +97,13 @@ def fit(
     forms = asked_forms(form, signals, low, high, kept, plain=reading == "continuous" and method == "joint")
     if "direct" not in forms:
         fits = [
-            (_dual if one == "dual" else _signed)(signals, low, high, n_h, smoothing, kept) for one in forms
+            (_dual if one == "dual" else _signed)(signals, low, high, n_h, smoothing, kept, levels)
+            for one in forms
         ]
         return fits[-1] if fits[-1].misfit < BETTER * fits[0].misfit else fits[0]
     records = records_of(signals, low, high, kept)
     even = Plane.uniform(low, high, n_h)
-    plane = even if reading == "relay" else plane_for(records, low, high, n_h)
+    plane = levels or (even if reading == "relay" else plane_for(records, low, high, n_h))
     offsets = offsets_between(records, plane, reading)
     if np.any(offsets):
         moved = [(u, y - shift) for (u, y), shift in zip(signals, offsets, strict=True)]
@@ -111,23 +114,40 @@ def fit(
         return Fitted(found, tuple(records), offsets)
 
     fitted = on(plane)
-    if not fitted.evenly_spaced and fitted.misfit > CROWDED_MISFIT:
+    if levels is None and not fitted.evenly_spaced and fitted.misfit > CROWDED_MISFIT:
         return on(even)
     return fitted
 
 
-def _signed(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
+def _signed(
+    signals: Signals,
+    low: float,
+    high: float,
+    n_h: int,
+    smoothing: Smoothing,
+    kept: Kept,
+    levels: Plane | None,
+) -> Fitted:
     """Fit weights of either sign."""
     records = records_of(signals, low, high, kept)
-    found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
+    plane = levels or plane_for(records, low, high, n_h)
+    found = identify(records, plane, smoothing=smoothing, signed=True)
     return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
 
-def _dual(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
+def _dual(
+    signals: Signals,
+    low: float,
+    high: float,
+    n_h: int,
+    smoothing: Smoothing,
+    kept: Kept,
+    levels: Plane | None,
+) -> Fitted:
     """Fit the operator from output to input: first to the input, then where the noise is."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    found = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept).identified
+    found = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept, levels=levels).identified
     records = tuple(records_of(signals, low, high, kept))
     if not found.stiffness:  # else it describes the record poorly, in whatever variable
         found = replace(found, operator=in_output(found.operator, records, found.smoothing))

@@ -29,7 +29,7 @@ from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.forms import completed, static_behind
+from pulsetrainer.diagnosis.forms import completed, levels_of, static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.raw import noise_of
@@ -313,11 +313,12 @@ def extended_model(state: State, model: Model) -> Model:
         for t in state.repeated.terms
         if t in lasting or t in faults_of(state) or isinstance(t.cause, ConditionChange)
     ]
-    behind = static_behind(state.repeated, known, model, scale)
+    partial = not covers_range([one.input for one in state.problem.records], 0.0, 1.0)
+    behind = static_behind(state.repeated, known, model, scale, levels=levels_of(model) if partial else None)
     found = behind.identified.operator
     remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
     covered = coverage(found.plane, remembered)
-    if not covers_range([one.input for one in state.problem.records], 0.0, 1.0):
+    if partial:
         found, covered = completed(found, covered, model, remembered)
     return Model(
         edges=found.plane.edges,

@@ -151,9 +151,9 @@ class Bins:
         return scipy.sparse.block_diag(blocks, format="csr")
 
     def _is_even(self, k: int, step_s: float) -> bool:
-        """Whether a record has a bin at every step."""
-        time = self.time_s[self.record == k]
-        return bool(np.array_equal(np.floor(time / step_s), np.arange(time.size)))
+        """Whether a record has a bin at every step from its first one on, where a filter begins at rest."""
+        at = np.floor(self.time_s[self.record == k] / step_s)
+        return bool(np.array_equal(at - at[:1], np.arange(at.size)))
 
     def constant(self, along: FloatArray) -> float:
         """Return the offset that belongs to coordinates (k,) along ``free``."""

@@ -153,7 +153,9 @@ def weights_for(
 
     The rows are those of ``near``; what the causes make of them is subtracted from the output, with the
     weights of the pass before: m <- fit(y - (M(m) - D m)). The passes contract by the relative size
-    of the causes, some per cent, and end when they change little against the residual. ``rebuild`` makes
+    of the causes, some per cent, and end when they change little against the residual. If they do not
+    contract, the best of them is taken, or of those that begin with nothing: the rows of a filter begin at
+    rest where a masked lead ends, and cells that are seen only there may have any weight. ``rebuild`` makes
     new rows for the input that the hysteresis now sees, so that nothing of an input cause is left to be
     subtracted.
     """
@@ -166,6 +168,8 @@ def weights_for(
     elif problem.base is not None:
         # before anything is fitted: what the weights correct, alone
         added = Simulator(problem, _operator(problem, np.zeros(problem.plane.n_q), 0.0))(terms)
+    made: list[Fitted] = []
+    moved = inf
     for _ in range(LIMITS.passes):
         wanted = problem.measured - added
         found = design.fit(wanted, passive, signed=problem.signed)
@@ -174,14 +178,16 @@ def weights_for(
         simulator = Simulator(problem, _operator(problem, found.x, offset))
         simulated = simulator(terms)
         residual = problem.bins.settled(problem.measured - simulated)
+        squares = float(residual @ residual)
+        made.append(Fitted(tuple(terms), simulator, design, found.passive, simulated, residual, squares))
         before, added = added, simulated - design.shown(simulator.operator)
-        if np.linalg.norm(problem.bins.settled(added - before)) < LIMITS.passes_settled * np.linalg.norm(
-            residual
-        ):
+        moves, moved = moved, float(np.linalg.norm(problem.bins.settled(added - before)))
+        if moved < LIMITS.passes_settled * np.linalg.norm(residual):
             break
-    assert simulator is not None
-    squares = float(residual @ residual)
-    return Fitted(tuple(terms), simulator, design, found.passive, simulated, residual, squares)
+        if moved >= moves:
+            made += [] if near is None else [weights_for(problem, terms, None)]
+            return min(made, key=lambda fitted: fitted.squares)
+    return made[-1]
 
 
 def _operator(problem: Problem, masses: FloatArray, offset: float) -> Preisach:

@@ -26,7 +26,7 @@ from pulsetrainer.core.fit import Fitted as StaticFit
 from pulsetrainer.core.fit import fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -48,10 +48,13 @@ def base_of(model: Model, scale: Scale) -> Static | None:
     return base
 
 
-def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Scale) -> StaticFit:
+def static_behind(
+    found: Fitted, known: Sequence[Term], model: Model, scale: Scale, *, levels: Plane | None = None
+) -> StaticFit:
     """Return the static part of a model in the form of ``model``, fitted to what causes leave of the records.
 
-    It is identified as any model is, with its own levels, smoothing and polarity, in the units of the record.
+    It is identified as any model is, with its own smoothing and polarity, and its own levels where none are
+    given, in the units of the record.
     What causes that are not ``known`` (properties of the device, and faults of the measurement that can be
     taken out of a record) did to the records is taken out but for its mean: where the zero will be on another
     day nobody knows, and its mean is the best guess.
@@ -72,7 +75,13 @@ def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Sca
         signals.append((u, y))
         kept.append(record.counts)
     operator, form = operator_of(model), cast("Form", model.form)
-    return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept)
+    return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept, levels=levels)
+
+
+def levels_of(model: Model) -> Plane:
+    """Return the plane on which the weights of a model lie."""
+    given = operator_of(model)
+    return given.inner.plane if isinstance(given, Dual) else given.plane
 
 
 def completed(
@@ -80,13 +89,9 @@ def completed(
 ) -> tuple[Preisach, BoolArray]:
     """Return a static part with the cells of a model where inputs (n,) never ``covered`` it (q,), and those.
 
-    Those cells stay as they are in the records, so they only shift the output, which the offset undoes. On
-    other levels cells cannot be exchanged: the static part of the model is kept whole.
+    Both lie on the levels of the model. Those cells stay as they are in the records, so they only shift the
+    output, which the offset undoes.
     """
-    given = operator_of(model)
-    own = given.inner if isinstance(given, Dual) else given
-    if not np.array_equal(found.plane.edges, own.plane.edges):
-        return own, model.covered
-    both = replace(found, weights=np.where(covered, found.weights, own.weights))
+    both = replace(found, weights=np.where(covered, found.weights, model.weights))
     shift = float(np.mean(np.concatenate([found(u) - both(u) for u in inputs])))
     return replace(both, offset=both.offset + shift), covered | model.covered

@@ -13,7 +13,7 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import experiment, gates, raw, residual
+from pulsetrainer.diagnosis import experiment, fitting, gates, raw, residual
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
@@ -395,6 +395,35 @@ def test_a_filter_that_forgets_soon_is_a_matrix(name, values, short):
         np.testing.assert_allclose(matrix @ columns, bins.filtered(columns, through, steps), atol=1e-10)
         holes = replace(record, sample_weight=1.0 * (np.arange(record.input.size) % 1000 > 300))
         assert problem_for([holes], 0.0, 1.5).bins.short(through, steps[:1]) is None
+
+
+def test_passes_that_drift_apart_end_with_the_best_of_them(monkeypatch):
+    """Rows of less than half of what the weights do make each pass overshoot the last one."""
+    problem = replace(problem_for([_lagging()], 0.0, 1.5), signed=True)
+    design = weights_for(problem, (), None).design
+    short = replace(design, nodes=0.4 * design.nodes)
+    monkeypatch.setattr(fitting, "_rows", lambda *_: short)
+    made, kind = [], fitting.Fitted
+    monkeypatch.setattr(fitting, "Fitted", lambda *told: made.append(kind(*told)) or made[-1])
+    found = weights_for(problem, (), None)
+    squares = [one.squares for one in made]
+    assert found.squares == min(squares) < squares[-1]
+
+
+def test_a_filter_begins_at_rest_where_a_masked_lead_ends():
+    """The rows after a first stroke that is left out stay sparse."""
+    record = _lagging()
+    led = replace(record, sample_weight=1.0 * (np.arange(record.input.size) >= 1000))
+    problem = problem_for([led], 0.0, 1.5)
+    bins, steps = problem.bins, [record.step]
+
+    def through(columns, k, dt_s):
+        return library()["output-lag"].on_output(columns, (0.004,), replace(problem.frames[k], dt_s=dt_s))
+
+    columns = np.random.default_rng(5).normal(1.0, 1.0, (bins.count, 3))
+    matrix = bins.short(through, steps)
+    assert matrix is not None
+    np.testing.assert_allclose(matrix @ columns, bins.filtered(columns, through, steps), atol=1e-10)
 
 
 def test_a_quick_look_counts_with_what_was_found_only():
