@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 SMALLEST = (50, 10)  # columns and lines
 _ROWS = 5  # of the trace
 _SHOWN_S = 3.0
-_STILL_A = 0.02  # less is what a converter shows of none
 _DRAWN_EACH_S = 0.08
 Press = Callable[[str, float], None]
 Status = Callable[[float], str]
@@ -73,11 +72,11 @@ class Live:
         said = (
             f"{100 * self._share:3.0f} %  {now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
         )
-        if now.resting:
-            said += "  at rest" if now.current[-1] < _STILL_A else "  first stroke: no finger yet"
-        elif beat is not None:
-            rate = 60.0 / now.interval_s
-            said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"
+        if beat is None:
+            said += "  first stroke: no finger yet" if now.leading else "  at rest"
+        else:
+            rate, height = 60.0 / beat.interval_s, 100 * beat.play.amplitude
+            said += f"  {self._names[beat.play.pulse]}  {rate:.0f}/min  {height:.0f} %"
         lines += [said, self._status(now.time_s), keys_in(width)]
         return Text("\n".join(lines), no_wrap=True, overflow="crop")
 

@@ -18,6 +18,7 @@ AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
 )
+KEEP = "Use the model as it is: nothing that was found calls for another one."
 # of tied causes one of which is the measurement's, another the device's: no record decides, a person may
 KNOWN = (
     " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
@@ -110,17 +111,18 @@ ADVICE: Mapping[str, str] = {
         "be extended by, or that could be taken out of the recording."
     ),
     "too noisy": (
-        "These recordings could not have shown {names} as small as {matters:.2g} % of the span. Record the "
-        "same for {times:.2g} times as long, or with less noise, and diagnose that."
+        f"{KEEP} These recordings could not have shown {{names}} as small as {{matters:.2g}} % of the span. "
+        "If that matters to you, record the same for {times:.2g} times as long, or with less noise, and "
+        "diagnose that."
     ),
     "far too noisy": (
-        "These recordings could not have shown {names} as small as {matters:.2g} % of the span, and longer "
-        "ones would hardly do so. Record with less noise: averaged, with a finer sensor, or over a wider "
-        "range."
+        f"{KEEP} These recordings could not have shown {{names}} as small as {{matters:.2g}} % of the span, "
+        "and longer ones would hardly do so. If that matters to you, record with less noise: averaged, with "
+        "a finer sensor, or over a wider range."
     ),
     "inconclusive": (
-        "These recordings could not have shown {names} of {matters:.2g} % of the span. "
-        f"To see that, {AGAIN}"
+        f"{KEEP} These recordings could not have shown {{names}} of {{matters:.2g}} % of the span. "
+        f"If that matters to you, {AGAIN}"
     ),
     "extend, or late": (
         "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "

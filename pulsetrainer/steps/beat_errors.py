@@ -42,7 +42,7 @@ class Ledger:
     _sum: float = 0.0
     _low: float = np.inf
     _high: float = -np.inf
-    _beat_last: bool = False  # what was measured last belongs to a beat
+    _last: Given | None = None  # what was measured last belongs to it
 
     def give(self, given: Given) -> None:
         """Take in a piece that will be played."""
@@ -65,7 +65,7 @@ class Ledger:
             place = sample[at:upto] - piece.first
             target[at:upto] = piece.target[place]
             self._measured[place] = force[at:upto]
-            self._beat_last = piece.beat is not None
+            self._last = piece
             at = upto
             if upto < sample.size or (upto and sample[upto - 1] == end - 1):
                 done.append(piece)
@@ -104,12 +104,13 @@ class Ledger:
         self._rows.extend((beat.start_s, beat.interval_s, beat.play.pulse, asked, gain, late, mean, most))
 
     @property
-    def is_beating(self) -> bool:
-        """Whether what is being measured belongs to a beat.
+    def under_way(self) -> Beat | None:
+        """The beat that what is being measured belongs to, None of a stroke before beats and of a rest.
 
         On a busy computer all that was given out may be measured before more is: that is no rest.
         """
-        return self._given[0].beat is not None if self._given else self._beat_last
+        piece = self._given[0] if self._given else self._last
+        return piece.beat if piece else None
 
     def beats(self, unit: str) -> Beats:
         """Return every beat that is over."""

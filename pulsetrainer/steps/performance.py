@@ -23,7 +23,7 @@ from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.beat_errors import Ledger
-from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
+from pulsetrainer.steps.conductor import RATE_HZ, Beat, Conductor, Decide, Reach
 from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.stopped import in_part
 
@@ -59,9 +59,8 @@ class Now:
     target: FloatArray  # (n,) N, the samples that came last
     current: FloatArray  # (n,) A
     force: FloatArray  # (n,) N
-    beat: Play | None  # the one that was pressed last
-    interval_s: float
-    resting: bool  # no beat is under way
+    beat: Beat | None  # the one that is under way
+    leading: bool  # no beat of this part has come: the first stroke, or the rest before it or after it
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +123,7 @@ class Performance:
         self._parts = self._dropped = self._underruns = 0
         self._taken = 0  # samples of the part that are kept
         self._fault = self._remedy = self._implausible = ""
-        self._last: Given | None = None
+        self._leading = True
 
     def run(self, lead_s: float) -> Performed:
         """Press part after part until the end is decided, or the device or the user stops it."""
@@ -132,7 +131,7 @@ class Performance:
         decimation = round(device.info.tick_rate_Hz / RATE_HZ)
         self._sink.judge(self._so_far().fields)
         while not conductor.ended and not self._fault:
-            dropped, self._taken = self._dropped, 0
+            dropped, self._taken, self._leading = self._dropped, 0, True
             self._begun = self._next = round(conductor.time_s * RATE_HZ)
             self._begins_s.append(conductor.time_s)
             if self._thermometer is not None:
@@ -209,20 +208,11 @@ class Performance:
         self._taken += sample.size
         for piece, force in zip(done, measured, strict=True):
             if piece.beat is not None:
-                self._last = piece
                 time_s = (piece.first + np.arange(force.size)) / RATE_HZ
                 self._implausible = self._implausible or judge_against(time_s, piece.predicted, force)
         if any(piece.beat is not None for piece in done):
             self._sink.judge(self._so_far().fields)
-        last = self._last.beat if self._last else None
-        self._watch(
-            Now(
-                measured_s,
-                target,
-                block.current_A,
-                block.force_N,
-                last.play if last else None,
-                last.interval_s if last else float("nan"),
-                resting=not self._ledger.is_beating,
-            )
-        )
+        beat = self._ledger.under_way
+        self._leading = self._leading and beat is None
+        now = Now(measured_s, target, block.current_A, block.force_N, beat, leading=self._leading)
+        self._watch(now)

@@ -463,6 +463,16 @@ def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     assert "━".encode() not in terminal.seen
 
 
+def test_the_screen_says_when_no_finger_may_be_there(tmp_path):
+    """The first stroke once, then each beat from its first one on, then rest: what a teacher goes by."""
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 4)
+    assert terminal.end() == 0
+    lines = re.findall(rb" s +-?[\d.]+ N +-?[\d.]+ A  ([^\r\n\x1b]*)", terminal.seen)
+    said = [re.sub(r" .*/min.*", "", line.decode()) for line in lines]
+    changes = [one for one, before in zip(said, [None, *said], strict=False) if one != before]
+    assert changes == ["first stroke: no finger yet", "normal", "at rest"]
+
+
 def test_a_key_that_was_taken_is_shown_and_goes_again(tmp_path):
     """Nothing said so until its beat came, and it was pressed again; 'x' stayed to the end."""
     words = ("--pulses", "normal,bifid", "--rate", 100, "--minutes", 10)

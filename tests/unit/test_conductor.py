@@ -363,12 +363,12 @@ def test_a_beat_after_which_nothing_is_given_out_yet_is_no_rest():
     """As on a busy computer: "at rest" was shown between two beats, and taken for the pause."""
     _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
     ledger = Ledger(NAMES[:1])
-    assert not ledger.is_beating
+    assert ledger.under_way is None
     for piece in given:
         ledger.give(piece)
         samples = piece.first + np.arange(piece.input.size)
         ledger.measure(samples, piece.target)
-        assert ledger.is_beating == (piece.beat is not None)
+        assert ledger.under_way is piece.beat
 
 
 def test_lost_samples_are_left_out():

@@ -880,6 +880,27 @@ def test_nobody_is_asked_for_a_recording_without_end(shown_from, longer):
     assert not re.search(r"\binf\b|e\+", said)
 
 
+@pytest.mark.parametrize(
+    ("lacks", "shown_from", "said"),
+    [
+        (("length",), 1.1, "5 times as long"),  # as the slow causes ask
+        (("length",), 3.0, "9 times as long"),  # as the noise asks
+        (("length",), 6.0, "less noise"),
+        (("length",), np.inf, "or more in all"),
+        (("holds", "length"), 6.0, "or more in all"),
+    ],
+)
+def test_a_recording_that_is_merely_short_is_asked_for_as_long_as_its_noise_needs(lacks, shown_from, said):
+    """Once longer is done, the same advice would come again, for a length that the noise had asked for."""
+    seen = {"delay": shown_from * LIMITS.matters}
+    bins = SimpleNamespace(time_s=np.asarray([0.0, LIMITS.short_s / 4.5]))
+    problem = SimpleNamespace(bins=bins)
+    state = SimpleNamespace(detectable=seen, blind=("delay",), lacks=lacks, problem=problem)
+    told = advised.advice(advice._to_see_more(state), advised.Bench(Scale(), "A"))
+    assert said in told
+    assert told.startswith("Use the model as it is")
+
+
 @pytest.mark.parametrize("name", advised.EXPERIMENTS)
 def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     """A piezo from 20 to 120 V whose second is 2 ms: volts, volts a second, milliseconds; never amperes."""

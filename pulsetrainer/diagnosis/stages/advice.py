@@ -33,6 +33,7 @@ from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.residual import LENGTH
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -157,6 +158,12 @@ def _to_see_more(state: State) -> Evidence:
     """Ask for what the records lack to show the causes that they could not have shown."""
     worst = max(state.detectable.get(name, np.inf) for name in state.blind)
     times = (worst / LIMITS.matters) ** 2
-    kind = "inconclusive" if state.lacks else "too noisy" if times <= LIMITS.longer else "far too noisy"
     figures = {"matters": PERCENT * LIMITS.matters, "times": max(np.ceil(times), 2.0)}
-    return Evidence(kind, figures=figures, names=(*state.blind, *state.lacks))
+    if set(state.lacks) - {LENGTH} or (state.lacks and not np.isfinite(times)):
+        return Evidence("inconclusive", figures=figures, names=(*state.blind, *state.lacks))
+    if times > LIMITS.longer:
+        return Evidence("far too noisy", figures=figures, names=state.blind)
+    if state.lacks:
+        short = LIMITS.short_s / float(state.problem.bins.time_s.max())
+        figures["times"] = max(figures["times"], float(np.ceil(short)))
+    return Evidence("too noisy", figures=figures, names=state.blind)
