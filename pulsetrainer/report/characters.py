@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-_BARS = " ▁▂▃▄▅▆▇█"
+BARS = " ▁▂▃▄▅▆▇█"
+PLAIN_BARS = " .:-=+*%#"  # for a terminal that has no others
 _BRAILLE = 0x2800
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint16)  # row, column
 
@@ -30,14 +31,14 @@ class Dots:
         return [row.tobytes().decode("utf-32-le") for row in (self._cells + _BRAILLE).astype("<u4")]
 
 
-def plotted(values: np.ndarray, width: int, rows: int) -> list[str]:
-    """Return a curve as ``rows`` lines of ``width`` block characters, lowest to highest value."""
+def plotted(values: np.ndarray, width: int, rows: int, bars: str = BARS) -> list[str]:
+    """Return a curve as ``rows`` lines of ``width`` characters of ``bars``, lowest to highest value."""
     known = np.nan_to_num(values, nan=float(np.nanmin(values)) if np.isfinite(values).any() else 0.0)
     means = np.asarray([part.mean() if part.size else known[-1] for part in np.array_split(known, width)])
     span = float(np.ptp(means)) or 1.0
-    height = (means - means.min()) / span * rows * (len(_BARS) - 1)
+    height = (means - means.min()) / span * rows * (len(bars) - 1)
     lines = []
     for row in range(rows - 1, -1, -1):
-        filled = np.clip(height - row * (len(_BARS) - 1), 0, len(_BARS) - 1).round().astype(int)
-        lines.append("".join(_BARS[k] for k in filled))
+        filled = np.clip(height - row * (len(bars) - 1), 0, len(bars) - 1).round().astype(int)
+        lines.append("".join(bars[k] for k in filled))
     return lines

@@ -473,6 +473,15 @@ def test_the_screen_says_when_no_finger_may_be_there(tmp_path):
     assert changes == ["first stroke: no finger yet", "normal", "at rest"]
 
 
+def test_a_terminal_without_unicode_gets_bars_of_its_letters(tmp_path, monkeypatch):
+    """Each block became an escape of six letters, and the lines ran over."""
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 2, port=FAST)
+    assert terminal.end() == 0
+    assert b"####" in terminal.seen
+    assert b"\\u" not in terminal.seen
+
+
 def test_a_key_that_was_taken_is_shown_and_goes_again(tmp_path):
     """Nothing said so until its beat came, and it was pressed again; 'x' stayed to the end."""
     words = ("--pulses", "normal,bifid", "--rate", 100, "--minutes", 10)

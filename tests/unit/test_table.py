@@ -450,6 +450,14 @@ def test_counts_since_a_date_are_told_by_their_size(table, heading, first, step,
     assert any(f"taken as {told}, by its size" in note for note in read.notes)
 
 
+@pytest.mark.parametrize(("heading", "said"), [("Zeit", True), ("Zeit [s]", False), ("Zeit (ms)", False)])
+def test_a_time_without_a_unit_in_slow_steps_may_be_in_ms(table, heading, said):
+    """A recorder of 2 kHz was read as one of 2 Hz, and nothing but a summary showed it."""
+    rows = "".join(f"{k / 2},{k % 7},{k % 5}\n" for k in range(200))
+    read = run_from_table(table(f"{heading},u,y\n{rows}").path, **COLUMNS)
+    assert any("if it is in ms, write the heading as 'Zeit [ms]'" in note for note in read.notes) is said
+
+
 @pytest.mark.parametrize(
     ("heading", "first", "told"),
     [
