@@ -35,8 +35,8 @@ WHICHEVER = (
 MAINS = "{mains:.4g} Hz is a frequency of the mains, so a hum is likely. "
 # of tied causes, beside a model that was extended by what was found
 EXTENDED = (
-    "Extend the model as it is (pulsetrainer extend): be it {either}, it then predicts recordings like these "
-    "better. "
+    "Extend the model now (pulsetrainer extend): it then predicts recordings like these better, whether it "
+    "is {either}. "
 )
 # of records without time
 RATE = (
@@ -223,7 +223,7 @@ MISSING: Mapping[str, str] = {
 EXPERIMENTS: Mapping[str, str] = {
     "nested loops": (
         "loops of the {input} between {low} and {high}, ever smaller about {centre} (turning at {turns}), "
-        "once each at {slow}, {middle}, {quick} and {fast}"
+        "once each at {slow}, {middle}, {quick} and {fast}, each begun at {low}"
     ),
     "steps and holds": "steps of the {input} at {fast} to {levels}, with a stop of {hold} after each",
     "equal minor loops": (
