@@ -144,5 +144,10 @@ class Interrupted(PulsetrainerError):  # noqa: N818 - the user's wish, not a fau
     kind = "interrupted"
 
 
+def in_words(kinds: Sequence[str]) -> str:
+    """Return kinds of artefacts as a person calls them: a file with a waveform in it is a drive."""
+    return " or ".join("drive" if kind == "waveform" else kind for kind in kinds)
+
+
 def _with_article(kind: str) -> str:
-    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
+    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {in_words([kind])}"

@@ -219,7 +219,7 @@ MESSAGES = {
     "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------
     "no such metric": Message("does not have", "it has", "{metric}"),
-    "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = "),
+    "out of bounds": Message("1 of 1 bound in", "the bound", "{metric}", "[99, 100]", " = "),
     "bug": Message("a bug: KeyError: 'force'", "--debug"),
 }
 

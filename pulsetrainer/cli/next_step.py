@@ -123,5 +123,5 @@ def _after_wrong_kind(problem: errors.WrongKindError) -> str:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
     if near := near_names(problem.path, problem.expected):
         files = ", ".join(shlex.quote(str(problem.path.with_name(name))) for name in near)
-        return f"{' or '.join(problem.expected)} files beside it: {files}"
+        return f"{errors.in_words(problem.expected)} files beside it: {files}"
     return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os.path import realpath  # a link to itself is told when it is read
 from pathlib import Path
 
 import typer
@@ -19,7 +20,7 @@ def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context:
     if context.info_name in _IN_PLACE:
         return
     for path in outputs:
-        if any(path.resolve() == given.resolve() for given in inputs):
+        if any(realpath(path) == realpath(given) for given in inputs):
             raise UsageError(
                 f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
                 hint="name another file",

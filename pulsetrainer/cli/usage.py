@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from typer import BadParameter
 
 from pulsetrainer.errors import DataError, UsageError
 
@@ -124,7 +127,8 @@ def _as_typed(option: str, words: Sequence[str]) -> str:
 def _alike(given: str, context: Any) -> list[str]:
     """Return the options that an unknown one may mean; of a letter, those that begin with it."""
     params = getattr(getattr(context, "command", None), "params", ())
-    names = [name[2:] for one in params for name in one.opts if name.startswith("--")]
+    names = [name[2:] for one in params if not getattr(one, "hidden", False) for name in one.opts]
+    names = [name for name in names if not name.startswith("-")]
     if len(given) == 2:
         near = [name for name in names if name.startswith(given[1:])]
     else:
@@ -156,7 +160,7 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
-    meaning = next((f": {_meaning(one)}" for one in params if option in one.opts), "")
+    meaning = next((f": {_meaning(one).partition(';')[0]}" for one in params if option in one.opts), "")
     return UsageError(f"{option} needs a value{meaning}", hint=f"write it after {option}, or see {help_}")
 
 
@@ -243,11 +247,24 @@ def _must(parameter: Any, error: Exception) -> str:
     if got is None or not hasattr(parameter.type, "name"):
         return said
     kind = "a whole number" if "int" in parameter.type.name else "a number"
+    value = repr(got[1]) if "valid" in got[0] else got[1].removesuffix(".0")
+    return f"must be {kind}{_within(parameter)}, got {value}"
+
+
+def _within(parameter: Any) -> str:
     low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    within = (
+    return (
         f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
     )
-    return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1].removesuffix('.0')}"
+
+
+def check_finite(context: Any) -> None:
+    """Raise BadParameter for an option that is nan or inf, which a range lets pass."""
+    for one in context.command.params:
+        value = context.params.get(one.name)
+        if isinstance(value, float) and not math.isfinite(value):
+            said = f"must be a finite number{_within(one)}, got {value}"
+            raise BadParameter(said, ctx=context, param=one)
 
 
 def _as_a_number(parameter: Any, must: str) -> str:
@@ -261,8 +278,11 @@ def _as_a_number(parameter: Any, must: str) -> str:
         return f"write it with a point and without a unit: {number}"
     if said and unit == said[1]:
         return f"write the number alone, in {unit}: {number}"
-    if said and unit[1:] == said[1] and unit[0] in _FACTORS and f"{said[1]} or " not in _meaning(parameter):
-        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
+    if said and unit[1:] == said[1] and unit[0] in _FACTORS:
+        other = (
+            "; or, of a model in other units, in its own" if f"{said[1]} or " in _meaning(parameter) else ""
+        )
+        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}{other}"
     # what is typed in ms must not be taken for s
     return f"write the number alone, without a unit; {named(parameter)} is: {_meaning(parameter)}"
 

@@ -216,8 +216,8 @@ def _bearable_wait_s(heat: float, reference_A: FloatArray, rate_Hz: float) -> fl
         share = 100.0 * float(course(0.0, reference_A, rate_Hz).max())
         raise ArgumentError(
             f"playing this would heat the coil to {math.ceil(share)} % of its limit, even from cold",
-            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher "
-            "`speed`), or at a lower current",
+            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), or at a lower current; "
+            "with few levels a higher `speed` helps too",
         )
     return seconds
 

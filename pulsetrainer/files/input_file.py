@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import glob
+import os
 import re
 from collections.abc import Iterable, Sequence
 from itertools import islice
@@ -48,6 +49,11 @@ def _first_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise DataError(f"{path} is a folder, expected a file", hint=_files_in(path))
+        if Path(os.path.realpath(path)).is_symlink():  # where all links lead is none, but for a circle
+            raise DataError(
+                f"{path} is a link that leads back to itself",
+                hint="remove the link, and name the file itself",
+            )
         if not path.exists():
             raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():

@@ -306,6 +306,13 @@ def test_a_single_sample_is_an_input():
     assert inversion.slew_limited(np.array([0.5]), 1000.0, 1.0).tolist() == [0.5]
 
 
+@pytest.mark.parametrize("slew", [1e6, 1e9, 1e12, 1e16, 1e100, 1e308])
+def test_a_huge_slew_is_no_limit(slew):
+    """Beside a ramp so steep the digits of the input would be lost."""
+    u = np.array([0.0, 1.0, 0.3, 0.7, 0.0])
+    assert inversion.slew_limited(u, 1000.0, slew).tolist() == u.tolist()
+
+
 def test_a_constant_input_gives_a_constant_output():
     """An input at rest is no mistake of the operator's: the output rests too."""
     for operator in (OPERATOR, RELAYS):
