@@ -14,8 +14,8 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
-from pulsetrainer.cli.next_step import next_step, to_make, with_files
-from pulsetrainer.cli.usage import check_finite, named, spaced
+from pulsetrainer.cli.next_step import as_options, next_step, to_make, with_files
+from pulsetrainer.cli.usage import check_finite, named, set_by, spaced
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError, in_words
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
@@ -103,11 +103,23 @@ class Command(TyperCommand):
                 if given is not None:
                     _name(error, given, ctx)
             error.hint = with_files(error.hint, ctx.params)
+            _tell_who_set_it(error, ctx)
             raise
+
+
+def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
+    """Name the variable or the file behind an option that is wrong, but was not typed."""
+    said = as_options(error.message)
+    for one in context.command.params:
+        if re.search(rf"{one.opts[0]}(?![\w-])", said) and (elsewhere := set_by(one, context)):
+            error.message += f" (it comes from {elsewhere[0]})"
+            error.hint = elsewhere[1]
 
 
 def _check_names(parameter: Any, typed: Any) -> None:
     """UsageError for a file without a name, as a script leaves it, or an option in the place of one."""
+    if parameter.type.name == "path":
+        parameter.type.readable = False  # that it is not, is told as of any other file that cannot be used
     for name in typed if isinstance(typed, list | tuple) else (typed,):
         if parameter.type.name != "path" or not isinstance(name, str):
             continue

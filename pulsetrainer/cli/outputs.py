@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 
 from pulsetrainer.errors import EndingError, UsageError
-from pulsetrainer.files.output_name import FORMATS, check_artefact_name
+from pulsetrainer.files.output_name import FORMATS, check_artefact_name, is_no_file
 
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
@@ -44,7 +44,7 @@ def check_ending(path: Path, context: typer.Context) -> None:
 def _check_text(path: Path, what: str, right: str, then: str) -> None:
     """A browser goes by the ending, and a file of settings without one would not be found again."""
     ending = path.suffix.lower()
-    if path.is_dir() or path.is_char_device():  # which is told when it is looked at
+    if is_no_file(path):
         return
     if ending in FORMATS | {""} and not (ending and right.startswith(ending)):  # .htm is a page too
         raise EndingError(path, what, right, then=then)

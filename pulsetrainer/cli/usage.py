@@ -13,6 +13,7 @@ from typing import Any
 from typer import BadParameter
 
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.settings import SETTINGS
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -84,14 +85,21 @@ _UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its
 
 
 def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError:
-    source = context.get_parameter_source(parameter.name) if context is not None else None
-    if source is not None and source.name == "ENVIRONMENT":  # nobody typed the option
-        return UsageError(
-            f"the variable {parameter.envvar} (for {named(parameter)}) {must}",
-            hint=f"correct it, or take it away: unset {parameter.envvar}",
-        )
+    if elsewhere := set_by(parameter, context):
+        return UsageError(f"{elsewhere[0]} (for {named(parameter)}) {must}", hint=elsewhere[1])
     hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
     return UsageError(f"{named(parameter)} {must}", hint=hint)
+
+
+def set_by(parameter: Any, context: Any) -> tuple[str, str] | None:
+    """Return what set a value that nobody typed as an option, and how it is put right; None: it was typed."""
+    source = context.get_parameter_source(parameter.name) if context is not None else None
+    if source is not None and source.name == "ENVIRONMENT":
+        return f"the variable {parameter.envvar}", f"correct it, or take it away: unset {parameter.envvar}"
+    if source is not None and source.name == "DEFAULT_MAP":
+        key = next(one.key for one in SETTINGS if one.variable == parameter.envvar)
+        return f"{key} in {context.find_root().obj}", f"correct it there, or give {named(parameter)}"
+    return None
 
 
 def check_apart(words: Sequence[str]) -> None:

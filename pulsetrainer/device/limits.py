@@ -38,7 +38,8 @@ class Limits:
         ):
             if wanted is not None and not 0 < wanted <= own:
                 raise ArgumentError(
-                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
+                    f"a {what} limit of {wanted:g} {unit} (`limit_{what}_{unit}`) was asked for; "
+                    f"the device's own is {own:g} {unit}",
                     hint=f"a limit can only be lowered: give `limit_{what}_{unit}` at most {own:g}",
                 )
         return (

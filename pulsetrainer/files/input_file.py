@@ -9,6 +9,7 @@ import difflib
 import glob
 import os
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
@@ -66,9 +67,18 @@ def _first_bytes(path: Path) -> bytes:
 
 def unreadable(path: Path | str, error: OSError) -> DataError:
     """Return the error for a file that cannot be read, with the system's reason in it."""
+    if isinstance(error, PermissionError):
+        return DataError(f"you have no permission to read {path}", hint=permit(path))
     return DataError(
         f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
     )
+
+
+def permit(path: Path | str) -> str:
+    """Return a hint for a file that may not be read; where its folder is locked, for that."""
+    folder = Path(path).parent
+    locked = path if os.access(folder, os.X_OK) else folder
+    return f"ask its owner for a copy, or if that is you: chmod u+rX {shlex.quote(str(locked))}"
 
 
 def _files_in(folder: Path) -> str:
