@@ -396,6 +396,19 @@ _WORDS_OF_A_TIRED_HAND = {
         ),
     ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
+    "settings without their option": (
+        *("tune pulsetrainer.toml", 2, "got pulsetrainer.toml", "pulsetrainer tune -o pulsetrainer.toml"),
+    ),
+    "a model behind an option where none goes": (
+        *("check --model model.h5", 2, "no option --model", "pulsetrainer check model.h5"),
+    ),
+    "a model beside a drive": (
+        *("play drive.h5 --model model.h5 -o out.h5", 2, "no option --model", "a drive holds the model"),
+    ),
+    "one pulse twice": (
+        *("session --model model.h5 --pulses normal,normal -o out.h5", 2, "normal is named twice"),
+        "each pulse once",
+    ),
     "a beginning of an option": (
         *("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out or --overwrite?\n"),
     ),
@@ -586,6 +599,26 @@ INSIDE = {
     "a table of a pulse that is not there": Mistake(
         ("invert", "absent.csv", "--model", "model.h5", "-o", "out.h5"),
         *(3, "absent.csv (argument WAVEFORM) does not exist", "name a pulse of the library"),
+    ),
+    "a bench in capitals": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "BENCH:"),
+        *(4, "no port BENCH:", "write it in small letters: --port bench:\n"),
+    ),
+    "a bench without its colon that is only planned": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench", "--dry-run"),
+        *(4, "no port bench", "write its colon: --port bench:\n"),
+    ),
+    "more levels than there can be": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--levels", "100000000"),
+        *(3, "--levels must be a whole number from 2 to 10000, got 100000000", "48 levels"),
+    ),
+    "a speed that no signal has": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
+        *(3, "--speed is too high: between two samples", "a lower --speed, or a higher --rate"),
+    ),
+    "a speed that takes for ever": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--speed", "1e-9"),
+        *(3, "the signal would have 7.35e+13 samples, expected at most 1e+08", "give a higher --speed"),
     ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),

@@ -61,7 +61,7 @@ def next_step(problem: errors.PulsetrainerError) -> str:
         known = problem.artefact in MAKES
         how = f"with `{to_make(problem.artefact, problem.path)}`" if known else "(see pulsetrainer --help)"
         return f"restore it from a copy, or make it again {how}"
-    if isinstance(problem, errors.NotAnArtefactError):
+    if isinstance(problem, errors.NotAnArtefactError) and not problem.foreign:
         if problem.path.suffix.lower() in _TABLES:
             table = shlex.quote(str(problem.path))
             columns = "--input COLUMN --output COLUMN"

@@ -40,6 +40,11 @@ _NO_COMMAND = {
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
+_NO_MODEL = {
+    "check": "give the model without an option: pulsetrainer check model.h5",
+    "play": "leave it out: a drive holds the model that it was made with",
+    "refine": "leave it out: a drive holds the model that it was made with",
+}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
@@ -65,6 +70,8 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
             hint = f"put it before the command: pulsetrainer --settings FILE{behind}"
         elif given == "--json" and command == "pulsetrainer":
             hint = "put it after the command: pulsetrainer show FILE.h5 --json"
+        elif given == "--model":
+            hint = _NO_MODEL.get(command.rpartition(" ")[2], hint)
         return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -224,6 +231,8 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
     instead = _INSTEAD.get(name, "{command} --help")
+    if name == "tune" and Path(extra).suffix == ".toml":
+        instead = "the file to write is an option: pulsetrainer tune -o {extra}"
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
     beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "

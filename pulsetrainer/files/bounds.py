@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import re
 from pathlib import Path
 
 from pulsetrainer.errors import UsageError
@@ -35,9 +36,11 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                     )
                     if math.isfinite(high - low):
                         usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
+                tables = re.search(r"^\s*\[", path.read_text(encoding="utf-8"), re.MULTILINE)
+                key = name.rpartition(".")[2] if tables else json.dumps(name)
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {json.dumps(name)} = {usual}, the lowest first" if "." in name else _HOW,
+                    hint=f"write {key} = {usual}, the lowest first" if "." in name else _HOW,
                 )
     if not bounds:
         raise UsageError(f"{path} has no bounds in it, so nothing would be checked", hint=_HOW)

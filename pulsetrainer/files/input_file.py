@@ -125,7 +125,7 @@ def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
         names = [
             entry.name
             for entry in sorted(path.parent.iterdir())
-            if entry.is_file() and (kind := _likely_kind(entry)) and (not kinds or kind in kinds)
+            if entry.is_file() and (kind := likely_kind(entry)) and (not kinds or kind in kinds)
         ]
     except OSError:
         return []
@@ -148,7 +148,7 @@ def is_sound(path: Path) -> bool:
         return False
 
 
-def _likely_kind(path: Path) -> str:
+def likely_kind(path: Path) -> str:
     """Return the kind of an artefact by its first bytes; empty where they tell of none."""
     try:
         with path.open("rb") as stream:

@@ -96,7 +96,8 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
         if "overwrite" in str(error):  # as the reader of TOML calls what stands there twice
             number = re.search(r"line \d+", str(error))
             raise UsageError(
-                f"{path} sets {line.partition('=')[0].strip()} a second time in {number and number[0]}: {line}",
+                f"{path} sets {line.partition('=')[0].strip()} a second time in "
+                f"{number[0] if number else 'it'}: {line}",
                 hint="remove one of the two",
             ) from error
         comma = re.fullmatch(r"\s*(\S+\s*=\s*-?\d+),(\d+)\s*", line)

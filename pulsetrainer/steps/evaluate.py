@@ -147,6 +147,8 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 
 
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
+    if run.input.size < 2:
+        raise DataError(f"{name} has one sample, which tells nothing of a model", hint="record a longer run")
     found: list[ModelEvaluation] = []
     notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
     notes += _wild_words(name, run)

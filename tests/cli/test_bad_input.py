@@ -112,7 +112,7 @@ def test_a_number_without_an_upper_end_is_told_its_lower_one(ready):
         (
             "t_s,current_A,force_N\n0,0,0\n1,nan,1\n2,1,2\n",
             "not finite",
-            {"value": "NaN", "column": "current_A", "line": 3},
+            {"value": "'nan'", "column": "current_A", "line": 3},
         ),
         ("t_s,current_A,force_N\n0,0,0\n2,1,1\n1,2,2\n", "time goes back", {}),
         ("t_s,current_A,force_N\n0,0,0\n1,abc,1\n", "not a number", {}),
@@ -193,8 +193,8 @@ def test_numbers_no_device_can_follow_are_refused_before_anything_moves(tmp_path
 @pytest.mark.parametrize(
     ("rows", "name", "names"),
     [
-        ("0,0\n,0.5\n0.2,1\n", "not finite", {"value": "NaN", "column": "t_s", "line": 3}),
-        ("0,0\n0.1,\n0.2,1\n", "not finite", {"value": "NaN", "line": 3}),
+        ("0,0\n,0.5\n0.2,1\n", "not finite", {"value": "a blank cell", "column": "t_s", "line": 3}),
+        ("0,0\n0.1,\n0.2,1\n", "not finite", {"value": "a blank cell", "line": 3}),
         ("0,0\n0.1,inf\n0.2,1\n", "not finite", {"value": "inf", "line": 3}),
         ("0,0\n0.1,1\n0.1,0.5\n", "time repeats", {}),
         ("nan,0\nnan,1\nnan,0.5\n", "no numbers", {}),
