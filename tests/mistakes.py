@@ -614,7 +614,11 @@ INSIDE = {
     ),
     "a speed that no signal has": Mistake(
         ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
-        *(3, "--speed is too high: between two samples", "a lower --speed, or a higher --rate"),
+        *(
+            3,
+            "between two samples the signal would move by 1e+06, more than its whole range of 1.5",
+            "a lower --speed, or a higher --rate",
+        ),
     ),
     "a speed that takes for ever": Mistake(
         ("capture", "identification", "-o", "out.h5", "--speed", "1e-9"),

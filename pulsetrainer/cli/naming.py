@@ -15,7 +15,8 @@ from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import as_options, next_step, to_make, with_files
-from pulsetrainer.cli.usage import check_finite, named, set_by, spaced
+from pulsetrainer.cli.usage import spaced
+from pulsetrainer.cli.values import check_finite, named, set_by
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError, in_words
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from typer import BadParameter
-
+from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.settings import SETTINGS
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -47,9 +44,6 @@ _NO_MODEL = {
 }
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
-_GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
-_FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
-_NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 
 
 def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
@@ -76,7 +70,7 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
-        return _bad_value(parameter, context, _must(parameter, error), help_)
+        return bad_value(parameter, context, must_be(parameter, error), help_)
     option = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(option, str):
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
@@ -86,27 +80,6 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None), words)
     )
-
-
-_UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
-
-
-def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError:
-    if elsewhere := set_by(parameter, context):
-        return UsageError(f"{elsewhere[0]} (for {named(parameter)}) {must}", hint=elsewhere[1])
-    hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
-    return UsageError(f"{named(parameter)} {must}", hint=hint)
-
-
-def set_by(parameter: Any, context: Any) -> tuple[str, str] | None:
-    """Return what set a value that nobody typed as an option, and how it is put right; None: it was typed."""
-    source = context.get_parameter_source(parameter.name) if context is not None else None
-    if source is not None and source.name == "ENVIRONMENT":
-        return f"the variable {parameter.envvar}", f"correct it, or take it away: unset {parameter.envvar}"
-    if source is not None and source.name == "DEFAULT_MAP":
-        key = next(one.key for one in SETTINGS if one.variable == parameter.envvar)
-        return f"{key} in {context.find_root().obj}", f"correct it there, or give {named(parameter)}"
-    return None
 
 
 def check_apart(words: Sequence[str]) -> None:
@@ -142,8 +115,8 @@ def _as_typed(option: str, words: Sequence[str]) -> str:
 def _alike(given: str, context: Any) -> list[str]:
     """Return the options that an unknown one may mean; of a letter, those that begin with it."""
     params = getattr(getattr(context, "command", None), "params", ())
-    names = [name[2:] for one in params if not getattr(one, "hidden", False) for name in one.opts]
-    names = [name for name in names if not name.startswith("-")]
+    offered = [one for one in params if not getattr(one, "hidden", False)]
+    names = [name[2:] for one in offered for name in one.opts if name.startswith("--")]
     if len(given) == 2:
         near = [name for name in names if name.startswith(given[1:])]
     else:
@@ -155,7 +128,7 @@ def _alike(given: str, context: Any) -> list[str]:
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
     like = example[1] if example else help_
-    said = f"{named(parameter)} is missing: {_meaning(parameter)}"
+    said = f"{named(parameter)} is missing: {meaning_of(parameter)}"
     given: list[Path] = (context.params.get("files") or []) if context is not None else []
     if given and parameter.name in ("input_column", "output_column"):
         try:
@@ -175,7 +148,7 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
-    meaning = next((f": {_meaning(one).partition(';')[0]}" for one in params if option in one.opts), "")
+    meaning = next((f": {meaning_of(one).partition(';')[0]}" for one in params if option in one.opts), "")
     return UsageError(f"{option} needs a value{meaning}", hint=f"write it after {option}, or see {help_}")
 
 
@@ -241,79 +214,3 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
         f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
         hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
     )
-
-
-def named(parameter: Any) -> str:
-    """Name of an option as it is typed, or of an argument as the help names it."""
-    names = sorted((name for name in parameter.opts if name.startswith("-")), key=len)
-    if not names:
-        word = str(parameter.human_readable_name)
-        return word.upper() if word.islower() else word  # as in the help, where it is given no other
-    return names[0] if len(names) == 1 else f"{names[0]} ({names[-1]})"
-
-
-def _meaning(parameter: Any) -> str:
-    text = (getattr(parameter, "help", None) or "what the command works on").rstrip(".")
-    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
-
-
-def _must(parameter: Any, error: Exception) -> str:
-    """What a value must be, and what it was."""
-    said = str(getattr(error, "message", error)).rstrip(".")
-    got = _GOT.match(said)
-    if got is None or not hasattr(parameter.type, "name"):
-        return said
-    kind = "a whole number" if "int" in parameter.type.name else "a number"
-    value = repr(got[1]) if "valid" in got[0] else got[1].removesuffix(".0")
-    return f"must be {kind}{_within(parameter)}, got {value}"
-
-
-def _within(parameter: Any) -> str:
-    low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    return (
-        f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
-    )
-
-
-def check_finite(context: Any) -> None:
-    """Raise BadParameter for an option that is nan or inf, which a range lets pass."""
-    for one in context.command.params:
-        value = context.params.get(one.name)
-        if isinstance(value, float) and not math.isfinite(value):
-            said = f"must be a finite number{_within(one)}, got {value}"
-            raise BadParameter(said, ctx=context, param=one)
-
-
-def _as_a_number(parameter: Any, must: str) -> str:
-    """How the number is written that was given with a decimal comma, or with its unit; else empty."""
-    given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
-    if given is None:
-        return ""
-    number, unit = given[1] + (f".{given[2]}" if given[2] else ""), given[3]
-    said = _UNIT.search(_meaning(parameter) + ".")
-    if not unit:
-        return f"write it with a point and without a unit: {number}"
-    if said and unit == said[1]:
-        return f"write the number alone, in {unit}: {number}"
-    if said and unit[1:] == said[1] and unit[0] in _FACTORS:
-        other = (
-            "; or, of a model in other units, in its own" if f"{said[1]} or " in _meaning(parameter) else ""
-        )
-        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}{other}"
-    # what is typed in ms must not be taken for s
-    return f"write the number alone, without a unit; {named(parameter)} is: {_meaning(parameter)}"
-
-
-def _choice(parameter: Any, must: str) -> str:
-    """Which of the words that an option takes is meant; else empty."""
-    given, choices = re.match("'(.*?)' is not one of", must), getattr(parameter.type, "choices", ())
-    near = difflib.get_close_matches(given[1].lower(), list(choices), n=1) if given else []
-    return f"did you mean {near[0]}?" if near else ""
-
-
-def _without(parameter: Any, help_: str) -> str:
-    """What happens when an option is left out."""
-    default = getattr(parameter, "default", None)
-    if isinstance(default, int | float) and not isinstance(default, bool):
-        return f"leave it out for the usual {default:g}, or see {help_}"
-    return help_ if getattr(parameter, "required", False) else f"leave it out, or see {help_}"

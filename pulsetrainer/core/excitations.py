@@ -103,8 +103,8 @@ def _check_step(step: float, reach: float) -> None:
     """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
     if step > reach:
         raise ArgumentError(
-            f"`speed_A_per_s` is too high: between two samples the signal would move by {step:.3g}, and its "
-            f"whole range is {reach:.3g}",
+            f"between two samples the signal would move by {step:.3g}, more than its whole range of "
+            f"{reach:.3g}",
             hint="give a lower `speed_A_per_s`, or a higher `rate_Hz`",
         )
 

@@ -264,7 +264,7 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
             )
     if samples < plane.n_h:
         raise ArgumentError(
-            f"a model of {plane.n_h} levels needs at least as many samples, and there are {samples} that count",
+            f"a model of {plane.n_h} levels needs at least as many samples that count, got {samples}",
             hint="use fewer `levels`, or a longer record",
         )
     return samples

@@ -354,7 +354,7 @@ def test_what_was_measured_is_never_the_output(ready, words):
         (["ports", "COM3"], 2, "doctor --port COM3"),
         (["help", "identify"], 2, "pulsetrainer identify --help"),
         (["--settings", "mine.json", "ports"], 2, "TOML"),
-        (["--settings", "mine.toml", "ports"], 2, "current_A = 1.0 under [limits]"),
+        (["--settings", "mine.toml", "ports"], 2, "current_A = 1.5 under [limits]"),
         (["diagnose", "played.h5", "--model", "model.h5", *OUT], 3, "evaluate played.h5"),
         (["play", "normal", *OUT], 3, "normal is a pulse: pulsetrainer invert normal"),
         (["play", "absent.h5", *OUT], 3, "drive files here: drive.h5"),

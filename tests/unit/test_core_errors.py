@@ -229,7 +229,7 @@ BAD = {
     },
     "path in steps beyond every float": (
         lambda: excitations.through(np.arange(3.0), 1e300, 1e-300),
-        ["path", "speed", "1e+300"],
+        ["samples", "at most 1e+08", "1e+300"],
     ),
     "path at infinite speed": (lambda: excitations.through(np.arange(3.0), INF, 100.0), ["speed", "finite"]),
     "negative rest": (
