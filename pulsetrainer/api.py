@@ -115,9 +115,7 @@ def open_device(
     1.5
     """
     if port is not None and not port.strip():
-        raise UsageError(
-            "`port` must name a port, got an empty text", hint='the simulated device is "bench:"'
-        )
+        raise UsageError("`port` must name a port, got nothing", hint='the simulated device is "bench:"')
     known = _known_gains(tuned)
     device = _device.open_device(port, limits=limits)
     try:

@@ -106,14 +106,20 @@ class DamagedFileError(DataError):
 
 
 class NotAnArtefactError(DataError):
-    """A file that this program did not write."""
+    """A file that this program did not write; ``foreign``: an HDF5 file, which cannot be imported either."""
 
-    def __init__(self, message: str, *, path: Path | str) -> None:
+    foreign_hint: ClassVar[str] = "export it as CSV with the program that wrote it, and import that: "
+    foreign_hint += "pulsetrainer import FILE.csv --input COLUMN --output COLUMN -o run.h5"
+
+    def __init__(self, message: str, *, path: Path | str, foreign: bool = False) -> None:
+        table = f"pt.read_table({str(path)!r}, input=..., output=...)"
         super().__init__(
             message,
-            hint="give a file that pulsetrainer wrote; of a table: "
-            f"pt.read_table({str(path)!r}, input=..., output=...)",
+            hint=self.foreign_hint
+            if foreign
+            else f"give a file that pulsetrainer wrote; of a table: {table}",
         )
+        self.foreign = foreign
         self.path = Path(path)
 
 
@@ -144,5 +150,10 @@ class Interrupted(PulsetrainerError):  # noqa: N818 - the user's wish, not a fau
     kind = "interrupted"
 
 
+def in_words(kinds: Sequence[str]) -> str:
+    """Return kinds of artefacts as a person calls them: a file with a waveform in it is a drive."""
+    return " or ".join("drive" if kind == "waveform" else kind for kind in kinds)
+
+
 def _with_article(kind: str) -> str:
-    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
+    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {in_words([kind])}"

@@ -37,6 +37,8 @@ def lay_out(folder: Path) -> None:
     (folder / "bare.toml").write_text("")
     (folder / "pulse.toml").write_text("normal = 3\n")
     (folder / "round.toml").write_text('"normal.continuous.mean_error_reduction_percent" = [98, 90]\n')
+    (folder / "words.toml").write_text('"normal.continuous.mean_error_reduction_percent" = ["a", "b"]\n')
+    (folder / "loop.csv").symlink_to("loop.csv")
     (folder / "one.toml").write_text('"normal.continuous.mean_error_reduction_percent" = 90\n')
 
 
@@ -159,7 +161,7 @@ _WORDS_IN_QUOTES = {
     ),
     "a folder as an output": (
         *(("identify", "run.h5", "-o", "bare/"), "-o (--out) must name a file, got the folder bare/"),
-        "the name of a file behind it",
+        "the name of a file in it",
     ),
     "a home in quotes": (
         *(("identify", "run.h5", "-o", "~/out.h5"), "the folder ~ does not exist", "without quotes"),
@@ -207,7 +209,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force in another unit": (
         *("invert normal --model model.h5 -o out.h5 --force-max 20kN", 2, "got '20kN'"),
-        "the number alone, without a unit; --force-max is: force at its top, N or",
+        "in N, without the unit: 20000; or, of a model in other units, in its own",
     ),
     "an option of another command": (
         "identify run.h5 --model model.h5 -o out.h5",
@@ -331,15 +333,48 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "has no bounds", "= [90, 100]"),
     "a bound the wrong way round": (
-        *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", "percent = [90.0, 98.0]"),
+        *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", 'percent" = [90.0, 98.0]'),
     ),
     "a bound of one number": (
         *(
             "evaluate played.h5 --bounds one.toml",
             2,
             "a pair [low, high], got 90",
-            "= [81.0, 99.0], the lowest first",
+            'percent" = [81.0, 99.0], the lowest first',
         ),
+    ),
+    "a bound of words": (
+        *("evaluate played.h5 --bounds words.toml", 2, "got ['a', 'b']", "= [90.0, 100.0], the lowest first"),
+    ),
+    "a delay that is no number": (
+        *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay nan", 2),
+        *("--delay must be a finite number, 0 or more, got nan", "leave it out for the usual 0"),
+    ),
+    "a rate without end": (
+        *("import run.csv --input u --output y -o out.h5 --rate inf", 2),
+        *("--rate must be a finite number, got inf", "leave it out"),
+    ),
+    "a rhythm that is no number": (
+        *("session --model model.h5 -o out.h5 --variability nan", 2, "a finite number from 0 to 25, got nan"),
+        "leave it out",
+    ),
+    "a table that is a link to itself": (
+        *(
+            "import loop.csv --input u --output y -o out.h5",
+            3,
+            "loop.csv is a link that leads back to itself",
+        ),
+        "remove the link, and name the file itself",
+    ),
+    "a run that is a link to itself": (
+        "identify loop.csv -o out.h5",
+        *(3, "leads back to itself", "remove the link"),
+    ),
+    "changes that are a link to itself": (
+        *("session --model model.h5 -o out.h5 --changes loop.csv", 3, "leads back to itself", "remove"),
+    ),
+    "a drive that is not named": (
+        *("tune --drive", 2, "--drive needs a value: file of a drive", "write it after --drive"),
     ),
     "a bound of a pulse": (
         *(
@@ -361,7 +396,22 @@ _WORDS_OF_A_TIRED_HAND = {
         ),
     ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
-    "a beginning of an option": ("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out"),
+    "settings without their option": (
+        *("tune pulsetrainer.toml", 2, "got pulsetrainer.toml", "pulsetrainer tune -o pulsetrainer.toml"),
+    ),
+    "a model behind an option where none goes": (
+        *("check --model model.h5", 2, "no option --model", "pulsetrainer check model.h5"),
+    ),
+    "a model beside a drive": (
+        *("play drive.h5 --model model.h5 -o out.h5", 2, "no option --model", "a drive holds the model"),
+    ),
+    "one pulse twice": (
+        *("session --model model.h5 --pulses normal,normal -o out.h5", 2, "normal is named twice"),
+        "each pulse once",
+    ),
+    "a beginning of an option": (
+        *("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out or --overwrite?\n"),
+    ),
     "two drives": ("play drive.h5 model.h5 -o out.h5", 2, "got model.h5 as well", "one drive at a time"),
     "a name with spaces, of the only file": (
         *("show two words.csv", 2, "got words.csv as well", "in quotes: 'two words.csv'"),
@@ -394,7 +444,8 @@ _WORDS_OF_A_TIRED_HAND = {
         "write {name}.h5 for",
     ),
     "an address of a table": (
-        *("import https://example.org/a.csv --input u --output y -o out.h5", 3, "(argument FILE.csv)"),
+        *("import https://example.org/a.csv --input u --output y -o out.h5", 3),
+        "https://example.org/a.csv (argument FILE.csv)",
         "download the file, and give its path",
     ),
     "a file in a folder that is absent": (
@@ -444,7 +495,7 @@ TABLES = {
 }
 INSIDE = {
     "a drive as a run": Mistake(
-        ("identify", "drive.h5", "-o", "out.h5"), 3, "got a waveform", "run files beside it: run.h5"
+        ("identify", "drive.h5", "-o", "out.h5"), 3, "got a drive", "run files beside it: run.h5"
     ),
     "a session that is not there": Mistake(
         ("evaluate", "monday.h5"), 3, "monday.h5 (argument ", "playback or session files here: played.h5"
@@ -483,7 +534,12 @@ INSIDE = {
     "a playback and a run": Mistake(("evaluate", "played.h5", "run.h5"), 2),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(
-        ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"), 2
+        ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"),
+        *(
+            2,
+            "model.h5 has no extensions",
+            "pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5",
+        ),
     ),
     "nothing left to resume": Mistake(("capture", "identification", "-o", "run.h5", "--resume"), 2),
     "a quiz where no key can be pressed": Mistake(
@@ -505,7 +561,7 @@ INSIDE = {
         ("evaluate", "played.h5", "--bounds", "bounds.toml"),
         2,
         "normal.continuous.mean_err",
-        "the same command with --json and without --bounds lists them",
+        "A name here is normal.continuous, a point, and one of mean_error_reduction_percent",
     ),
     "learnt from a drive that was not refined": Mistake(
         ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
@@ -518,7 +574,7 @@ INSIDE = {
             *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--input-unit", "Volts"),
             *("-o", "out.h5"),
         ),
-        *(3, "--input-unit 'Volts' is not a known unit", "did you mean 'V'?"),
+        *(3, "--input-unit 'Volts' is not a known unit", "did you mean 'V'? Write --input-unit V"),
     ),
     "a unit in words, with a prefix": Mistake(
         (
@@ -544,13 +600,41 @@ INSIDE = {
         ("invert", "absent.csv", "--model", "model.h5", "-o", "out.h5"),
         *(3, "absent.csv (argument WAVEFORM) does not exist", "name a pulse of the library"),
     ),
+    "a bench in capitals": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "BENCH:"),
+        *(4, "no port BENCH:", "write it in small letters: --port bench:\n"),
+    ),
+    "a bench without its colon that is only planned": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench", "--dry-run"),
+        *(4, "no port bench", "write its colon: --port bench:\n"),
+    ),
+    "more levels than there can be": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--levels", "100000000"),
+        *(3, "--levels must be a whole number from 2 to 10000, got 100000000", "48 levels"),
+    ),
+    "a speed that no signal has": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
+        *(
+            3,
+            "between two samples the signal would move by 1e+06, more than its whole range of 1.5",
+            "a lower --speed, or a higher --rate",
+        ),
+    ),
+    "a speed that takes for ever": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--speed", "1e-9"),
+        *(3, "the signal would have 7.35e+13 samples, expected at most 1e+08", "give a higher --speed"),
+    ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
         *(4, "no port bench?seed=3", "write its colon: --port 'bench:?seed=3&creep=0'"),
     ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
-        *(3, "playing this would heat the coil to 108 % of its limit, even from cold", "fewer --levels"),
+        *(
+            3,
+            "playing this would heat the coil to 108 % of its limit, even from cold",
+            "fewer --levels, --repeats or --periods), or at a lower current; ",
+        ),
     ),
     "a pulse whose time stands still": Mistake(
         ("invert", "still.csv", "--model", "model.h5", "-o", "out.h5"), 3, "line 4", "with more digits\n"
@@ -597,6 +681,10 @@ INSIDE = {
     "a session of no beat": Mistake(
         ("session", "--model", "model.h5", "-o", "out.h5", "--beats", "0"),
         *(2, "--beats must be 1 or more and at most 345600, got 0", "about a quarter of a minute"),
+    ),
+    "a session of less than a beat": Mistake(
+        ("session", "--model", "model.h5", "-o", "out.h5", "--minutes", "0.0001"),
+        *(2, "--minutes must be 0.05 (3 s) or more and at most 1440 (a day), got 0.0001", "give --beats 20"),
     ),
     "a rate that no heart has": Mistake(
         ("session", "--model", "model.h5", "-o", "out.h5", "--rate", "1000"),

@@ -95,8 +95,8 @@ MESSAGES = {
     # --- numbers -----------------------------------------------------------------------------------------
     "force out of reach": Message("is asked for", "--force-max", expected="reaches 0.5", got="40 N"),
     "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
-    "too slow": Message("a path of", "speed", got="{got} samples"),
-    "too fast": Message("from one sample to the next", "speed", expected="1.5", got="1e+297"),
+    "too slow": Message("the signal would have", "speed", got="{got} samples"),
+    "too fast": Message("between two samples", "speed", expected="1.5", got="1e+297"),
     "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
     "too many samples": Message(
         "samples", "at most", expected="more than {most}", got="{times} times {samples}"
@@ -110,7 +110,7 @@ MESSAGES = {
     ),
     "recorded with other options": Message("other options", "the same options", "a.h5"),
     "not such an argument": Message("{argument} must", "", got="{got}"),
-    "too few samples": Message("from one sample to the next", "a lower `speed_A_per_s`", got="{got}"),
+    "too few samples": Message("between two samples", "a lower `speed_A_per_s`", got="{got}"),
     "method too large": Message("dense", "", got="{method}"),
     "plane too large": Message("dense", ""),
     "too few blocks": Message("at least 2 blocks", "a shorter block"),
@@ -218,8 +218,8 @@ MESSAGES = {
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),
     "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------
-    "no such metric": Message("does not have", "it has", "{metric}"),
-    "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = "),
+    "no such metric": Message("does not have", "A name here is", "{metric}"),
+    "out of bounds": Message("1 of 1 bound in", "the bound", "{metric}", "[99, 100]", " = "),
     "bug": Message("a bug: KeyError: 'force'", "--debug"),
 }
 

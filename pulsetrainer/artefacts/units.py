@@ -108,10 +108,11 @@ def check_unit(text: str, what: str, where: str = "") -> str:
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
     spelled = _SPELLED.get(text.lower())
     near = [spelled] if spelled else difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
-    give = f"did you mean {' or '.join(repr(n) for n in near)}? Give" if near else "give"
     raise DataError(
         f"{what} {text!r}{where and ' in '}{where} is not a known unit",
-        hint=f"{give} {what}, such as N or mm/s^2; 1 stands for a pure number",
+        hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
+        if near
+        else f"give {what}, such as N or mm/s^2; 1 stands for a pure number",
     )
 
 

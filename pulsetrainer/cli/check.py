@@ -39,7 +39,7 @@ def check(
 
     if update != (out is not None):
         raise UsageError(
-            "--update, which writes the updated model, and -o, which names its file, need each other",
+            "--update, which writes the updated model, and -o, which names its file, must be given together",
             hint="give both, or neither",
         )
     job = Job(context, inputs=(model,), outputs=(out,))

@@ -62,6 +62,7 @@ def evaluate(
             from pulsetrainer.report.html import render_evaluation
 
             job.page(html, render_evaluation, evaluation, header)
+    from pulsetrainer.artefacts.units import counted
     from pulsetrainer.errors import QualityError
     from pulsetrainer.files import store
     from pulsetrainer.report.results import evaluated
@@ -69,9 +70,8 @@ def evaluate(
     failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
-        are = "is" if len(broken) == 1 else "are"
         failed = QualityError(
-            f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}",
+            f"{len(broken)} of {counted(len(limits), 'bound')} in {bounds} not met: {listed}",
             hint="find out what changed; if the new figure is right, change the bound on purpose",
         )
     job.alike(model)

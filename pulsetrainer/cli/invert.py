@@ -98,7 +98,8 @@ def invert(
             progress=progress,
         )
         if refined is not None:
-            drive = pt.transfer(drive, refined, slew=slew_A_per_s)
+            names = (str(learnt), str(model))
+            drive = pt.transfer(drive, refined, slew=slew_A_per_s, names=names)
         from pulsetrainer.report.results import drive_title, inverted
 
         if pulse == Path(waveform):  # a file of the user's, wherever it lies

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -64,7 +65,7 @@ class Job:
         written = [path for path in outputs if path is not None]
         for path in written:
             check_ending(path, context)
-        if len({path.resolve() for path in written}) < len(written):
+        if len(set(map(realpath, written))) < len(written):
             raise UsageError(
                 f"{written[0]} was named for two outputs", hint="name another file for one of them"
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import re
 import shlex
 from collections import Counter
 from pathlib import Path
@@ -13,9 +14,10 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
-from pulsetrainer.cli.next_step import next_step, to_make, with_files
-from pulsetrainer.cli.usage import named, spaced
-from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
+from pulsetrainer.cli.next_step import as_options, next_step, to_make, with_files
+from pulsetrainer.cli.usage import spaced
+from pulsetrainer.cli.values import check_finite, named, set_by
+from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError, in_words
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
 
@@ -72,7 +74,9 @@ class Command(TyperCommand):
                 )
         for one in self.params:
             _check_names(one, typed.get(one.name or ""))
-        return super().parse_args(ctx, args)
+        left = super().parse_args(ctx, args)
+        check_finite(ctx)
+        return left
 
     def get_short_help_str(self, limit: int = 45) -> str:
         """Return the first sentence of the help, whole: a narrow terminal folds it."""
@@ -100,11 +104,23 @@ class Command(TyperCommand):
                 if given is not None:
                     _name(error, given, ctx)
             error.hint = with_files(error.hint, ctx.params)
+            _tell_who_set_it(error, ctx)
             raise
+
+
+def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
+    """Name the variable or the file behind an option that is wrong, but was not typed."""
+    said = as_options(error.message)
+    for one in context.command.params:
+        if re.search(rf"{one.opts[0]}(?![\w-])", said) and (elsewhere := set_by(one, context)):
+            error.message += f" (it comes from {elsewhere[0]})"
+            error.hint = elsewhere[1]
 
 
 def _check_names(parameter: Any, typed: Any) -> None:
     """UsageError for a file without a name, as a script leaves it, or an option in the place of one."""
+    if parameter.type.name == "path":
+        parameter.type.readable = False  # that it is not, is told as of any other file that cannot be used
     for name in typed if isinstance(typed, list | tuple) else (typed,):
         if parameter.type.name != "path" or not isinstance(name, str):
             continue
@@ -113,7 +129,7 @@ def _check_names(parameter: Any, typed: Any) -> None:
             got = "an empty name"
             hint = "write the name; if a script gives it, check that its variable is set"
         elif name.endswith("/") and option in ("--out", "--html", "-o"):
-            got, hint = f"the folder {name}", "write the name of a file behind it"
+            got, hint = f"the folder {name}", "write the name of a file in it"
         elif name.startswith("--") and option.startswith("-"):
             got, hint = f"the option {name}", f"write the name after {option}, then {name}"
         if got:
@@ -150,6 +166,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         kinds, word = ("run",), "RUN.h5"
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
+    error.message = re.sub(r"^(\w+):/(?=\w)", r"\1://", error.message)  # of an address a path keeps one slash
     if name == "drive" and str(error.path) in library():
         error.hint = f"{error.path} is a pulse: pulsetrainer invert {error.path} --model model.h5 -o drive.h5"
         return
@@ -172,11 +189,11 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     where = "here" if folder == Path() else f"in {folder}"
     near = [shlex.quote(str(error.path.with_name(name))) for name in near_names(error.path, kinds)]
     if near:
-        error.hint = f"{' or '.join(kinds) or 'pulsetrainer'} files {where}: {', '.join(near)}"
+        error.hint = f"{in_words(kinds) or 'pulsetrainer'} files {where}: {', '.join(near)}"
     elif kinds:
         usual = f"to make one: {to_make(kinds[0], error.path)}"
         instead = _RUN_FOR.get(command, usual) if kinds == ("run",) else usual
-        error.hint = f"there is no {' or '.join(kinds)} file {where}; {instead}"
+        error.hint = f"there is no {in_words(kinds)} file {where}; {instead}"
     else:
         error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"
 

@@ -61,7 +61,7 @@ def next_step(problem: errors.PulsetrainerError) -> str:
         known = problem.artefact in MAKES
         how = f"with `{to_make(problem.artefact, problem.path)}`" if known else "(see pulsetrainer --help)"
         return f"restore it from a copy, or make it again {how}"
-    if isinstance(problem, errors.NotAnArtefactError):
+    if isinstance(problem, errors.NotAnArtefactError) and not problem.foreign:
         if problem.path.suffix.lower() in _TABLES:
             table = shlex.quote(str(problem.path))
             columns = "--input COLUMN --output COLUMN"
@@ -123,5 +123,5 @@ def _after_wrong_kind(problem: errors.WrongKindError) -> str:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
     if near := near_names(problem.path, problem.expected):
         files = ", ".join(shlex.quote(str(problem.path.with_name(name))) for name in near)
-        return f"{' or '.join(problem.expected)} files beside it: {files}"
+        return f"{errors.in_words(problem.expected)} files beside it: {files}"
     return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"

@@ -23,7 +23,7 @@ def positive(value: float | None, param: CallbackParam) -> float | None:
 def not_empty(port: str | None) -> str | None:
     """Refuse ``--port "$PORT"`` where that is not set: it would play on the simulated device instead."""
     if port is not None and not port.strip():
-        raise BadParameter("must name a port, got an empty text")
+        raise BadParameter("must name a port, got nothing")
     return port
 
 

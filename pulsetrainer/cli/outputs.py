@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os.path import realpath  # a link to itself is told when it is read
 from pathlib import Path
 
 import typer
 
 from pulsetrainer.errors import EndingError, UsageError
-from pulsetrainer.files.output_name import FORMATS, check_artefact_name
+from pulsetrainer.files.output_name import FORMATS, check_artefact_name, is_no_file
 
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
@@ -19,7 +20,7 @@ def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context:
     if context.info_name in _IN_PLACE:
         return
     for path in outputs:
-        if any(path.resolve() == given.resolve() for given in inputs):
+        if any(realpath(path) == realpath(given) for given in inputs):
             raise UsageError(
                 f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
                 hint="name another file",
@@ -43,7 +44,7 @@ def check_ending(path: Path, context: typer.Context) -> None:
 def _check_text(path: Path, what: str, right: str, then: str) -> None:
     """A browser goes by the ending, and a file of settings without one would not be found again."""
     ending = path.suffix.lower()
-    if path.is_dir() or path.is_char_device():  # which is told when it is looked at
+    if is_no_file(path):
         return
     if ending in FORMATS | {""} and not (ending and right.startswith(ending)):  # .htm is a page too
         raise EndingError(path, what, right, then=then)

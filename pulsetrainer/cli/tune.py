@@ -38,7 +38,8 @@ def tune(
     drive: Annotated[
         list[Path],
         Option(
-            help="Drive that the coil must follow; may be given again. Default: two pulses of the library."
+            help="File of a drive that the coil must follow, made by invert; may be given again. "
+            "Default: two pulses of the library."
         ),
     ] = [],  # noqa: B006
     limit_current_A: LimitCurrent = None,

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
@@ -36,11 +37,13 @@ _NO_COMMAND = {
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
+_NO_MODEL = {
+    "check": "give the model without an option: pulsetrainer check model.h5",
+    "play": "leave it out: a drive holds the model that it was made with",
+    "refine": "leave it out: a drive holds the model that it was made with",
+}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
-_GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
-_FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
-_NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 
 
 def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
@@ -61,11 +64,13 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
             hint = f"put it before the command: pulsetrainer --settings FILE{behind}"
         elif given == "--json" and command == "pulsetrainer":
             hint = "put it after the command: pulsetrainer show FILE.h5 --json"
+        elif given == "--model":
+            hint = _NO_MODEL.get(command.rpartition(" ")[2], hint)
         return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
-        return _bad_value(parameter, context, _must(parameter, error), help_)
+        return bad_value(parameter, context, must_be(parameter, error), help_)
     option = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(option, str):
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
@@ -75,20 +80,6 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None), words)
     )
-
-
-_UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
-
-
-def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError:
-    source = context.get_parameter_source(parameter.name) if context is not None else None
-    if source is not None and source.name == "ENVIRONMENT":  # nobody typed the option
-        return UsageError(
-            f"the variable {parameter.envvar} (for {named(parameter)}) {must}",
-            hint=f"correct it, or take it away: unset {parameter.envvar}",
-        )
-    hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
-    return UsageError(f"{named(parameter)} {must}", hint=hint)
 
 
 def check_apart(words: Sequence[str]) -> None:
@@ -124,7 +115,8 @@ def _as_typed(option: str, words: Sequence[str]) -> str:
 def _alike(given: str, context: Any) -> list[str]:
     """Return the options that an unknown one may mean; of a letter, those that begin with it."""
     params = getattr(getattr(context, "command", None), "params", ())
-    names = [name[2:] for one in params for name in one.opts if name.startswith("--")]
+    offered = [one for one in params if not getattr(one, "hidden", False)]
+    names = [name[2:] for one in offered for name in one.opts if name.startswith("--")]
     if len(given) == 2:
         near = [name for name in names if name.startswith(given[1:])]
     else:
@@ -136,7 +128,7 @@ def _alike(given: str, context: Any) -> list[str]:
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
     like = example[1] if example else help_
-    said = f"{named(parameter)} is missing: {_meaning(parameter)}"
+    said = f"{named(parameter)} is missing: {meaning_of(parameter)}"
     given: list[Path] = (context.params.get("files") or []) if context is not None else []
     if given and parameter.name in ("input_column", "output_column"):
         try:
@@ -156,7 +148,7 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
-    meaning = next((f": {_meaning(one)}" for one in params if option in one.opts), "")
+    meaning = next((f": {meaning_of(one).partition(';')[0]}" for one in params if option in one.opts), "")
     return UsageError(f"{option} needs a value{meaning}", hint=f"write it after {option}, or see {help_}")
 
 
@@ -212,6 +204,8 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
     instead = _INSTEAD.get(name, "{command} --help")
+    if name == "tune" and Path(extra).suffix == ".toml":
+        instead = "the file to write is an option: pulsetrainer tune -o {extra}"
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
     beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
@@ -220,63 +214,3 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
         f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
         hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
     )
-
-
-def named(parameter: Any) -> str:
-    """Name of an option as it is typed, or of an argument as the help names it."""
-    names = sorted((name for name in parameter.opts if name.startswith("-")), key=len)
-    if not names:
-        word = str(parameter.human_readable_name)
-        return word.upper() if word.islower() else word  # as in the help, where it is given no other
-    return names[0] if len(names) == 1 else f"{names[0]} ({names[-1]})"
-
-
-def _meaning(parameter: Any) -> str:
-    text = (getattr(parameter, "help", None) or "what the command works on").rstrip(".")
-    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
-
-
-def _must(parameter: Any, error: Exception) -> str:
-    """What a value must be, and what it was."""
-    said = str(getattr(error, "message", error)).rstrip(".")
-    got = _GOT.match(said)
-    if got is None or not hasattr(parameter.type, "name"):
-        return said
-    kind = "a whole number" if "int" in parameter.type.name else "a number"
-    low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    within = (
-        f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
-    )
-    return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1].removesuffix('.0')}"
-
-
-def _as_a_number(parameter: Any, must: str) -> str:
-    """How the number is written that was given with a decimal comma, or with its unit; else empty."""
-    given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
-    if given is None:
-        return ""
-    number, unit = given[1] + (f".{given[2]}" if given[2] else ""), given[3]
-    said = _UNIT.search(_meaning(parameter) + ".")
-    if not unit:
-        return f"write it with a point and without a unit: {number}"
-    if said and unit == said[1]:
-        return f"write the number alone, in {unit}: {number}"
-    if said and unit[1:] == said[1] and unit[0] in _FACTORS and f"{said[1]} or " not in _meaning(parameter):
-        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
-    # what is typed in ms must not be taken for s
-    return f"write the number alone, without a unit; {named(parameter)} is: {_meaning(parameter)}"
-
-
-def _choice(parameter: Any, must: str) -> str:
-    """Which of the words that an option takes is meant; else empty."""
-    given, choices = re.match("'(.*?)' is not one of", must), getattr(parameter.type, "choices", ())
-    near = difflib.get_close_matches(given[1].lower(), list(choices), n=1) if given else []
-    return f"did you mean {near[0]}?" if near else ""
-
-
-def _without(parameter: Any, help_: str) -> str:
-    """What happens when an option is left out."""
-    default = getattr(parameter, "default", None)
-    if isinstance(default, int | float) and not isinstance(default, bool):
-        return f"leave it out for the usual {default:g}, or see {help_}"
-    return help_ if getattr(parameter, "required", False) else f"leave it out, or see {help_}"

@@ -64,9 +64,9 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
         steps = float(distance[-1] / speed * rate_Hz)
     if not steps <= MOST_SAMPLES or not np.isfinite(speed / rate_Hz):
         raise ArgumentError(
-            f"a path of {distance[-1]:.3g} at a speed of {speed:g} would have {steps:.3g} samples "
-            f"at {rate_Hz:g} Hz",
-            hint="give another speed or rate",
+            f"the signal would have {steps:.3g} samples, expected at most {MOST_SAMPLES:.3g}: it goes "
+            f"{distance[-1]:.3g} at {speed:g} a second, {rate_Hz:g} samples a second",
+            hint="give a higher `speed_A_per_s`, a lower `rate_Hz` or a smaller range",
         )
     # a turn between two samples would be cut short: put it on the nearest sample, each turn on one of its own
     apart = np.abs(np.diff(points)) > _DUST * np.abs(points).max()
@@ -103,7 +103,7 @@ def _check_step(step: float, reach: float) -> None:
     """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
     if step > reach:
         raise ArgumentError(
-            f"from one sample to the next the signal would go {step:.3g}, more than its whole range of "
+            f"between two samples the signal would move by {step:.3g}, more than its whole range of "
             f"{reach:.3g}",
             hint="give a lower `speed_A_per_s`, or a higher `rate_Hz`",
         )

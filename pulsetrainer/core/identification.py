@@ -264,8 +264,8 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
             )
     if samples < plane.n_h:
         raise ArgumentError(
-            f"records must hold at least one sample for each of the {plane.n_h} levels, got {samples}",
-            hint="use fewer levels or a longer record",
+            f"a model of {plane.n_h} levels needs at least as many samples that count, got {samples}",
+            hint="use fewer `levels`, or a longer record",
         )
     return samples
 

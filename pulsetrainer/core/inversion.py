@@ -258,6 +258,8 @@ def slew_limited(inputs: ArrayLike, rate_Hz: float, slew: float) -> FloatArray:
     """
     positive(slew=slew, rate=rate_Hz)
     u = finite_vector("inputs", inputs)
+    if slew / rate_Hz >= np.ptp(u):  # it limits nothing, and beside a huge ramp digits of the input were lost
+        return u.copy()
     ramp = np.arange(u.size) * (slew / rate_Hz)
 
     def highest_below(path: FloatArray) -> FloatArray:

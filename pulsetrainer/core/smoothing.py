@@ -188,9 +188,9 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     held_out = {fold: part for fold, part in enumerate(sums) if part.weight_sum > 0}
     if len(held_out) < 2:
         raise ArgumentError(
-            "smoothing='auto' holds out blocks of a record, but the "
-            f"{sum(np.count_nonzero(r.counts) for r in records)} samples that count lie in one block",
-            hint="give smoothing as a number",
+            "`smoothing` auto tries a model of one part of a record on another, but the "
+            f"{sum(np.count_nonzero(r.counts) for r in records)} samples that count make one part only",
+            hint="record more, or give `smoothing` a number, such as 0.02",
         )
     error = _HeldOut(held_out, reading, signed=signed)
     tried = _tried(error)

@@ -38,7 +38,8 @@ class Limits:
         ):
             if wanted is not None and not 0 < wanted <= own:
                 raise ArgumentError(
-                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
+                    f"a {what} limit of {wanted:g} {unit} (`limit_{what}_{unit}`) was asked for; "
+                    f"the device's own is {own:g} {unit}",
                     hint=f"a limit can only be lowered: give `limit_{what}_{unit}` at most {own:g}",
                 )
         return (
@@ -216,8 +217,8 @@ def _bearable_wait_s(heat: float, reference_A: FloatArray, rate_Hz: float) -> fl
         share = 100.0 * float(course(0.0, reference_A, rate_Hz).max())
         raise ArgumentError(
             f"playing this would heat the coil to {math.ceil(share)} % of its limit, even from cold",
-            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher "
-            "`speed`), or at a lower current",
+            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), or at a lower current; "
+            "with few levels a higher `speed` helps too",
         )
     return seconds
 

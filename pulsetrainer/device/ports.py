@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import re
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -112,13 +111,9 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         )
     if number in {errno.ENOENT, errno.ENODEV, errno.ENXIO} or "FileNotFoundError" in text:
         present = ", ".join(p.device for p in list_ports()) or "none"
-        scheme, mark, rest = port.partition("?")
-        scheme = scheme.rstrip(":").lower()
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint=f"write its colon: `port` {shlex.quote(f'{scheme}:{mark}{rest}')}"
-            if scheme in ("bench", "qemu")
-            else "check the cable, then `pulsetrainer ports`; without a device use `port` bench:, over a "
+            hint="check the cable, then `pulsetrainer ports`; without a device use `port` bench:, over a "
             "network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:

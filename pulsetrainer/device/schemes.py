@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import DeviceError, UsageError
 
 if TYPE_CHECKING:
     from pulsetrainer.device.transport import Transport
@@ -63,10 +64,16 @@ def register(scheme: str, opener: Opener) -> None:
 def find_opener(port: str) -> Opener | None:
     """Return who opens a port of this text; None for a serial port, and for ``socket://`` and its like.
 
-    UsageError where nobody has announced its scheme.
+    UsageError where nobody has announced its scheme; DeviceError where one is written in capitals, or without
+    its colon.
     """
     match = re.match(r"([a-z][a-z0-9+-]*):(//)?", port)
     if match is None:
+        name, mark, rest = port.partition("?")
+        meant = f"{name.lower().rstrip(':')}:{mark}{rest}"
+        if name.lower().rstrip(":") in _OPENERS:
+            how = "its colon" if name.islower() else "it in small letters"
+            raise DeviceError(f"there is no port {port}", hint=f"write {how}: `port` {shlex.quote(meant)}")
         return None
     scheme, slashes = match.groups()
     if scheme not in _OPENERS and not slashes:

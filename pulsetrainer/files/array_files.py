@@ -12,28 +12,34 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
 
 RATE_NAMES = frozenset(["fs", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "f_s"])
 STEP_NAMES = frozenset(["dt", "dt_s", "ts", "tinterval", "sample_time"])
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+_KINDS = {"c": "complex numbers", "U": "text", "S": "text"}
 _WIDEST = 64  # columns that one matrix may give
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The vectors of a file, all of the length that most of them share, and its rate."""
+    """The vectors of a file, all of the length that most of them share, and its rate.
+
+    ``left_out`` says of what else there is why it is no column.
+    """
 
     values: Mapping[str, FloatArray]  # each (n,)
     rate_Hz: float | None
     units: Mapping[str, str]
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
 def reader_of(path: Path) -> Callable[[Path], Columns] | None:
@@ -149,10 +155,12 @@ def _read_wav(path: Path) -> Columns:
 def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Columns:
     """Return the vectors of the length that most have, and the rate if a number says it."""
     vectors: dict[str, FloatArray] = {}
+    left_out: dict[str, str] = {}
     rate = None
     for name, value in arrays.items():
         array = np.asarray(value)
         if array.dtype.kind not in "fiub":
+            left_out[name] = _KINDS.get(array.dtype.kind, "no numbers")
             continue
         array = np.squeeze(array)
         word = name.rpartition(".")[2].lower()
@@ -168,18 +176,30 @@ def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | N
             tall = array if array.shape[0] >= array.shape[1] else array.T
             for k in range(tall.shape[1]):
                 vectors[f"{name}{k + 1}"] = np.asarray(tall[:, k], dtype=np.float64)
+        else:
+            left_out[name] = f"an array of {' x '.join(map(str, array.shape))}"
     sizes = [vector.size for vector in vectors.values()]
     if not sizes:
-        listed = ", ".join(arrays) or "nothing"
+        listed = ", ".join(f"{name} ({left_out.get(name, 'one number')})" for name in arrays) or "nothing"
         raise DataError(
-            f"{path} holds no vector of numbers; it has {listed}", hint="save the columns as vectors"
+            f"{path} has no column of numbers; it has {listed}",
+            hint="save each quantity as a row of real numbers, all of one length",
         )
     # the record's columns are the longest vectors; shorter ones are settings
     longest = max(sizes)
-    return Columns({name: v for name, v in vectors.items() if v.size == longest}, rate, units or {})
+    values = {name: v for name, v in vectors.items() if v.size == longest}
+    left_out |= {
+        name: f"{counted(v.size, 'value')}, where the columns have {longest}"
+        for name, v in vectors.items()
+        if v.size < longest
+    }
+    return Columns(values, rate, units or {}, left_out)
 
 
 def _unreadable(path: Path, kind: str, error: Exception) -> DataError:
+    said = f": {error}"
+    if "pickle" in said or "RIFF" in said:  # which is for programmers
+        said = ", or holds objects of Python's" if "pickle" in said else ""
     return DataError(
-        f"{path} is not {kind} that can be read: {error}", hint="save it again, or export it as CSV"
+        f"{path} is not {kind} that can be read{said}", hint="save it again, or export it as CSV"
     )

@@ -37,8 +37,10 @@ def check_output(path: Path | str, overwrite: bool = False) -> None:
         _check_new_file(path, folder)
     except (OSError, RuntimeError) as error:  # a name too long, a forbidden folder, a link to itself
         reason = getattr(error, "strerror", None) or error
+        if isinstance(error, PermissionError):
+            reason = f"you have no permission for the folder {path.parent}"
         raise UsageError(
-            f"the output {path} cannot be written: {reason}", hint="name another output"
+            f"the output {path} cannot be written: {reason}", hint="name an output in another place"
         ) from error
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import math
+import re
 from pathlib import Path
 
 from pulsetrainer.errors import UsageError
@@ -26,16 +29,18 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case [low, high] if {type(low), type(high)} <= {int, float} and low <= high:
                 bounds[name] = float(low), float(high)
             case _:
-                of, _, figure = name.rpartition(".")
-                usual = [0.5, 1.5]
+                usual = [90.0, 100.0]
                 with contextlib.suppress(TypeError, ValueError):  # the wrong way round, in quotes, or one
                     low, high = sorted(
                         map(float, pair if isinstance(pair, list) else (0.9 * pair, 1.1 * pair))
                     )
-                    usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
+                    if math.isfinite(high - low):
+                        usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
+                tables = re.search(r"^\s*\[", path.read_text(encoding="utf-8"), re.MULTILINE)
+                key = name.rpartition(".")[2] if tables else json.dumps(name)
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {figure} = {usual}, the lowest first" if of else _HOW,
+                    hint=f"write {key} = {usual}, the lowest first" if "." in name else _HOW,
                 )
     if not bounds:
         raise UsageError(f"{path} has no bounds in it, so nothing would be checked", hint=_HOW)

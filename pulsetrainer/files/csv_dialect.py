@@ -18,9 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, NotAnArtefactError
 from pulsetrainer.files import time_stamps as stamps
 from pulsetrainer.files.csv_cells import COMMA_DECIMAL, MISSING, is_number, is_text, number, readable, split
+from pulsetrainer.files.input_file import likely_kind
 
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
@@ -148,13 +149,12 @@ def _encoding(path: Path) -> str:
     if high and not any(high) and all(low):  # without its mark
         return "utf-16-le"
     if b"\0" in start:
-        ours = start.startswith(b"\x89HDF")
-        raise DataError(
-            f"{path} is not a text file",
-            hint=f"it is an HDF5 file: see `pulsetrainer show {path}`, and give a table here"
-            if ours
-            else "export the recording as CSV",
-        )
+        hint = "export the recording as CSV"
+        if likely_kind(path):
+            hint = f"it is an HDF5 file: see `pulsetrainer show {path}`, and give a table here"
+        elif start.startswith(b"\x89HDF"):
+            hint = NotAnArtefactError.foreign_hint
+        raise DataError(f"{path} is not a text file", hint=hint)
     return "utf-8-sig"
 
 

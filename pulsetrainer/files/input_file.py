@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import difflib
 import glob
+import os
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
@@ -48,6 +50,11 @@ def _first_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise DataError(f"{path} is a folder, expected a file", hint=_files_in(path))
+        if Path(os.path.realpath(path)).is_symlink():  # where all links lead is none, but for a circle
+            raise DataError(
+                f"{path} is a link that leads back to itself",
+                hint="remove the link, and name the file itself",
+            )
         if not path.exists():
             raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():
@@ -60,9 +67,18 @@ def _first_bytes(path: Path) -> bytes:
 
 def unreadable(path: Path | str, error: OSError) -> DataError:
     """Return the error for a file that cannot be read, with the system's reason in it."""
+    if isinstance(error, PermissionError):
+        return DataError(f"you have no permission to read {path}", hint=permit(path))
     return DataError(
         f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
     )
+
+
+def permit(path: Path | str) -> str:
+    """Return a hint for a file that may not be read; where its folder is locked, for that."""
+    folder = Path(path).parent
+    locked = path if os.access(folder, os.X_OK) else folder
+    return f"ask its owner for a copy, or if that is you: chmod u+rX {shlex.quote(str(locked))}"
 
 
 def _files_in(folder: Path) -> str:
@@ -109,7 +125,7 @@ def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
         names = [
             entry.name
             for entry in sorted(path.parent.iterdir())
-            if entry.is_file() and (kind := _likely_kind(entry)) and (not kinds or kind in kinds)
+            if entry.is_file() and (kind := likely_kind(entry)) and (not kinds or kind in kinds)
         ]
     except OSError:
         return []
@@ -132,7 +148,7 @@ def is_sound(path: Path) -> bool:
         return False
 
 
-def _likely_kind(path: Path) -> str:
+def likely_kind(path: Path) -> str:
     """Return the kind of an artefact by its first bytes; empty where they tell of none."""
     try:
         with path.open("rb") as stream:

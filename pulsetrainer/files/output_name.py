@@ -12,12 +12,20 @@ FORMATS = {
 }
 
 
+def is_no_file(path: Path) -> bool:
+    """Whether an output is a folder, a device, or may not be looked at: told when it is to be written."""
+    try:
+        return path.is_dir() or path.is_char_device()
+    except OSError:
+        return True
+
+
 def check_artefact_name(path: Path, what: str, *, then: str = "") -> None:
     """Raise EndingError where the ``path`` of an artefact ends like another format, or is an ending alone.
 
     ``-`` is no name either: an artefact is not written to standard output.
     """
-    if path.is_dir() or path.is_char_device():  # which is told when it is looked at
+    if is_no_file(path):
         return
     if path.name.lower() in FORMATS | {"-"} or path.suffix.lower() in FORMATS - {".h5"}:
         raise EndingError(path, what, ".h5", then=then)

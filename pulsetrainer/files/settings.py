@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pulsetrainer.errors import UsageError
+from pulsetrainer.files.input_file import permit
 
 FILE_NAME = "pulsetrainer.toml"
 VARIABLE = "PULSETRAINER_SETTINGS"
@@ -31,6 +32,7 @@ class Setting:
     kind: type
     unit: str
     what: str
+    usual: str  # as it is written in the file
 
     @property
     def variable(self) -> str:
@@ -44,16 +46,16 @@ def variable(key: str) -> str:
 
 
 SETTINGS = (
-    Setting("port", str, "", "the device"),
-    Setting("levels", int, "", "levels of the plane"),
-    Setting("current_max_A", float, "A", "top of the range of a capture"),
-    Setting("speed_A_per_s", float, "A/s", "speed of identification"),
-    Setting("rate_Hz", float, "Hz", "sample rate"),
-    Setting("slew_A_per_s", float, "A/s", "fastest that a drive may move"),
-    Setting("periods", int, "", "periods of a pulse"),
-    Setting("repeats", int, "", "how often a drive is played"),
-    Setting("limits.current_A", float, "A", "highest current that the device accepts"),
-    Setting("limits.force_N", float, "N", "force above which the device switches off"),
+    Setting("port", str, "", "the device", '"bench:"'),
+    Setting("levels", int, "", "levels of the plane", "48"),
+    Setting("current_max_A", float, "A", "top of the range of a capture", "1.5"),
+    Setting("speed_A_per_s", float, "A/s", "speed of identification", "0.75"),
+    Setting("rate_Hz", float, "Hz", "sample rate", "1000.0"),
+    Setting("slew_A_per_s", float, "A/s", "fastest that a drive may move", "30.0"),
+    Setting("periods", int, "", "periods of a pulse", "4"),
+    Setting("repeats", int, "", "how often a drive is played", "5"),
+    Setting("limits.current_A", float, "A", "highest current that the device accepts", "1.5"),
+    Setting("limits.force_N", float, "N", "force above which the device switches off", "15.0"),
 )
 
 
@@ -87,8 +89,17 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        if isinstance(error, PermissionError):
+            raise UsageError(f"you have no permission to read {path}", hint=permit(path)) from error
         reason = "it is not a text file" if isinstance(error, UnicodeDecodeError) else error
         line = _line_of(error, path)
+        if "overwrite" in str(error):  # as the reader of TOML calls what stands there twice
+            number = re.search(r"line \d+", str(error))
+            raise UsageError(
+                f"{path} sets {line.partition('=')[0].strip()} a second time in "
+                f"{number[0] if number else 'it'}: {line}",
+                hint="remove one of the two",
+            ) from error
         comma = re.fullmatch(r"\s*(\S+\s*=\s*-?\d+),(\d+)\s*", line)
         raise UsageError(
             f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
@@ -141,10 +152,9 @@ def _value(path: Path, key: str, value: Any) -> Any:
     if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
         wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
         name = key.rpartition(".")[2]
-        usual = {str: '"bench:"', int: "5", float: "1.0"}[setting.kind]
         raise UsageError(
             f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}",
-            hint=f"write, for instance, {_in_its_table(key, f'{name} = {usual}')}",
+            hint=f"write, for instance, {_in_its_table(key, f'{name} = {setting.usual}')}",
         )
     return value
 

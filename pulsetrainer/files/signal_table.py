@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from pulsetrainer.core.excitations import Signal
     from pulsetrainer.files.table import Table
 
+_NOTHING_A = 5e-5  # of rounding: half of what a device tells apart
+
 
 def signal_file(signal: str, known: Sequence[str]) -> Path | None:
     """Return the file that a signal is read from; None where it is one of the ``known`` excitations.
@@ -42,6 +44,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     import numpy as np  # noqa: PLC0415
 
     from pulsetrainer.core import excitations  # noqa: PLC0415
+    from pulsetrainer.files.csv_dialect import column_words  # noqa: PLC0415
 
     table, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")
     unit = table.unit(table.names[1])
@@ -49,6 +52,13 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
         raise DataError(
             f"{path}: the column {table.names[1]} is in {unit}, expected the current to be played in A",
             hint="give the current in A in the second column, such as current_A",
+        )
+    below = np.flatnonzero(current < -_NOTHING_A)
+    if below.size:
+        at = f"{column_words(table.names[1])}, {table.place(int(below[0]))}"
+        raise DataError(
+            f"{path} has a current of {current[below[0]]:g} A in {at}; a device plays 0 A and more",
+            hint="shift or scale the signal, so that it begins at 0 A",
         )
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz

@@ -173,6 +173,7 @@ def _kind(file: h5py.File, path: Path | str) -> str:
         raise NotAnArtefactError(
             f"{path} is an HDF5 file from another program: it has no attributes kind and format_version",
             path=path,
+            foreign=True,
         )
     kind, version = text_of(file.attrs["kind"]), file.attrs["format_version"]
     if not np.issubdtype(type(version), np.integer):

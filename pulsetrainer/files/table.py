@@ -12,7 +12,7 @@ import difflib
 import io
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from pulsetrainer.artefacts.units import counted, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
+from pulsetrainer.files.csv_cells import number
 from pulsetrainer.files.csv_dialect import Dialect, column_words, detect, ends_in_a_number
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
@@ -49,6 +50,7 @@ class Table:
     rate_Hz: float | None = None  # where the file itself says one
     layout: str = ""  # of a text, in words: what separates its columns, and its decimal sign
     cut: bool = False  # a text that ends within its last number
+    left_out: Mapping[str, str] = field(default_factory=dict)  # of a file of arrays: why each is no column
 
     @property
     def rows(self) -> int:
@@ -103,8 +105,9 @@ class Table:
                 hint=f"name another column; it has {', '.join(self.names)}",
             )
         if bad.size:
-            missing = "an overload (9.9e37), a blank cell or NaN" if self.shifts else "NaN"
-            value = missing if np.isnan(values[bad[0]]) else values[bad[0]]
+            value = values[bad[0]]
+            if np.isnan(value):
+                value = self._cell(name, int(bad[0])) if self.shifts else "NaN"
             raise DataError(
                 f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
                 f"({_lacking(bad.size, values.size)}: {self.places(bad)})",
@@ -113,6 +116,16 @@ class Table:
         if said := beyond_all_quantities(values):
             raise DataError(f"{self.path}, {column_words(name)}, {said}", hint="correct or remove those rows")
         return values
+
+    def _cell(self, name: str, row: int) -> str:
+        """Return what stands in the cell of a text that is no number."""
+        dialect = detect(self.path)
+        with self.path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+            cells = dialect.split(next(islice(stream, self.line_of(row) - 1, None), "").rstrip("\n"))
+        cell = "".join(cells[self.index(name) :][:1])
+        value = number(cell)
+        overload = " (an overload)" if value is not None and np.isfinite(value) else ""
+        return f"{cell!r}{overload}" if cell else "a blank cell"
 
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
@@ -152,6 +165,17 @@ class Table:
                 f"{self.path} has no column {name!r} alone: {len(same)} columns have that heading, and are "
                 f"called {', '.join(same)}",
                 hint=f"name one of them: {' or '.join(map(repr, same))}",
+            )
+        if name in self.left_out:
+            return DataError(
+                f"{self.path}: {name} is no column, it has {self.left_out[name]}; columns: "
+                + ", ".join(self.names),
+                hint="save the quantities as rows of real numbers, all of one length",
+            )
+        if len(self.names) == 1:
+            return DataError(
+                f"{self.path} has no column {name!r}; it has a single one, {self.names[0]}",
+                hint="give a table with a column for each quantity",
             )
         near = [own for own in self.names if name.strip() and name.lower() in own.lower()]
         near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
@@ -258,7 +282,7 @@ def _of_arrays(path: Path, columns: Columns) -> Table:
     names = tuple(columns.values)
     units = {name: symbol_of(columns.units.get(name) or split_unit(name)[1]) for name in names}
     named = {name: unit for name, unit in units.items() if unit}
-    return Table(path, names, columns.values, named, (), rate_Hz=columns.rate_Hz)
+    return Table(path, names, columns.values, named, (), rate_Hz=columns.rate_Hz, left_out=columns.left_out)
 
 
 def _units(dialect: Dialect) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -16,9 +17,10 @@ def figure_format(path: Path, what: str, *more: str) -> str:
     EndingError where it is none of them.
     """
     form = path.suffix.lower().lstrip(".")
-    if path.is_dir():  # which is told when it is looked at
-        return FORMATS[0]
     if form not in (*FORMATS, *more):
+        with suppress(OSError):  # a folder, or one that is locked, is told when it is looked at
+            if path.is_dir():
+                return FORMATS[0]
         known = [*FORMATS, *more]
         written_as = f"{what} is written as {', '.join(known[:-1])} or {known[-1]}"
         raise EndingError(path, written_as, ".png", usual="figure")

@@ -37,10 +37,12 @@ def check_force_range(low: float | None, high: float | None) -> None:
 
 def check_asked_for(answers: object, quiz: int, pulses: Sequence[str]) -> None:
     """Raise UsageError for pulses named twice or not at all, answers without a quiz, a quiz that is none."""
-    if not pulses or len(set(pulses)) < len(pulses):
+    if not pulses:
+        raise UsageError("a session needs pulses, got none", hint="name some of the library: normal,bifid")
+    if twice := [name for name, times in Counter(pulses).items() if times > 1]:
         raise UsageError(
-            "a session needs pulses, each named once, got " + (", ".join(pulses) or "none"),
-            hint="name some of the library: normal,bifid",
+            f"{twice[0]} is named twice, and each pulse gets an equal share",
+            hint="name each pulse once, such as normal,bifid",
         )
     if quiz:
         check_quiz(len(pulses), quiz)
@@ -164,11 +166,11 @@ def _kinds_in(annotation: str) -> tuple[tuple[type, ...], tuple[type, ...]]:
     return tuple(known[word] for word in alone), tuple(known[word] for word in each)
 
 
-def check_levels(levels: int | None) -> None:
+def check_levels(levels: int | None, most: int = MOST_LEVELS) -> None:
     """Raise ArgumentError for what is no number of levels; None is no choice."""
-    if levels is not None and (not 2 <= levels <= MOST_LEVELS or levels != int(levels)):
+    if levels is not None and (not 2 <= levels <= most or levels != int(levels)):
         raise ArgumentError(
-            f"`levels` must be a whole number from 2 to {MOST_LEVELS}, got {levels}",
+            f"`levels` must be a whole number from 2 to {most}, got {levels}",
             hint="48 levels suit most devices",
         )
 

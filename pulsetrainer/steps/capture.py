@@ -12,12 +12,12 @@ from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.excitations import Signal
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.plane import MOST_LEVELS, Plane
 from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
 from pulsetrainer.errors import DeviceError, Interrupted, UsageError
-from pulsetrainer.steps.arguments import EXCITATIONS
+from pulsetrainer.steps.arguments import EXCITATIONS, check_levels
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
     InMemory,
@@ -111,6 +111,7 @@ def excitation(
     if isinstance(signal, Signal):
         return signal
     if signal == "identification":
+        check_levels(levels, MOST_LEVELS)
         return excitations.identification(
             0.0, current_max_A, n_h=levels, speed=speed_A_per_s, rate_Hz=rate_Hz
         )

@@ -14,7 +14,7 @@ from pulsetrainer.diagnosis.causes import library, upright_values
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.question import measured_of
 from pulsetrainer.diagnosis.raw import Raw
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import named
 
 _DELAY = "delay"  # told by the caller: no record tells a recorder's from the device's
@@ -40,6 +40,8 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
 
     Raises
     ------
+    UsageError
+        The delay is no finite number, or below 0.
     DataError
         The diagnosis is of another run, found nothing beyond doubt that can be corrected, or there is a
         delay and the run has no time or is shorter.
@@ -55,6 +57,10 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     ...
     pulsetrainer.errors.DataError: ...
     """
+    if not 0.0 <= delay_s < np.inf:
+        raise UsageError(
+            f"`delay` must be a finite number, 0 or more, got {delay_s:g}", hint="give it in seconds: 0.001"
+        )
     run_name, diagnosis_name = named(names, ("the run", "the diagnosis"))
     known = {one.fingerprint: k for k, one in enumerate(diagnosis.records)}
     parts = [(where, run.cut(where)) for where in run.slices]

@@ -147,6 +147,8 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 
 
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
+    if run.input.size < 2:
+        raise DataError(f"{name} has one sample, which tells nothing of a model", hint="record a longer run")
     found: list[ModelEvaluation] = []
     notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
     notes += _wild_words(name, run)
@@ -286,11 +288,13 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]
     if unknown:
-        near = difflib.get_close_matches(unknown[0], figures, n=3) or sorted(figures)[:3]
+        stems = evaluation.stems
+        near = difflib.get_close_matches(unknown[0], figures, n=1)
+        own = [name.removeprefix(f"{stems[0]}.") for name in figures if name.startswith(f"{stems[0]}.")]
         raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
-            hint=f"it has {', '.join(near)} and others: the same command with --json and without --bounds "
-            "lists them",
+            hint=(f"did you mean {near[0]}? " if near else "")
+            + f"A name here is {' or '.join(stems)}, a point, and one of {', '.join(own)}",
         )
     return tuple(
         Breach(name, value, low, high)

@@ -268,7 +268,10 @@ def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
         raise UsageError(
             f"{name} has no extensions, so there is no extended inverse",
             hint="leave `method` out, or extend the model first: "
-            "pulsetrainer diagnose run.h5 --model model.h5 -o diagnosis.h5",
+            "pulsetrainer capture diagnostic -o diagnostic.h5, "
+            "then pulsetrainer diagnose diagnostic.h5 --model MODEL.h5 -o diagnosis.h5, "
+            "then pulsetrainer extend diagnosis.h5 --model MODEL.h5 -o extended.h5; and invert that one: "
+            "`model` extended.h5",
         )
     if asked in ("continuous", "extended") and relay:
         raise UsageError(

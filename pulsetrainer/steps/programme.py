@@ -11,6 +11,7 @@ from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.conductor import Decision, Play
 
 USUAL_MINUTES = 5.0
+LEAST_MINUTES = 0.05  # more than half of it is over before the first beat
 MOST_MINUTES = 1440  # a day: a longer one is a slip of the keys, and would be planned for minutes
 MOST_BEATS = 240 * MOST_MINUTES  # at the fastest rate
 
@@ -54,10 +55,11 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
             f"`beats` must be 1 or more and at most {MOST_BEATS}, got {beats}",
             hint="for instance 20 beats, which last about a quarter of a minute",
         )
-    if minutes is not None and not 0 < minutes <= MOST_MINUTES:
+    if minutes is not None and not LEAST_MINUTES <= minutes <= MOST_MINUTES:
         raise UsageError(
-            f"`minutes` must be above 0 and at most {MOST_MINUTES} (a day), got {minutes:g}",
-            hint="a usual length is 5",
+            f"`minutes` must be {LEAST_MINUTES} (3 s) or more and at most {MOST_MINUTES} (a day), "
+            f"got {minutes:g}",
+            hint="a usual length is 5; for a few beats give `beats` 20",
         )
 
 

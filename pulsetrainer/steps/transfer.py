@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from pulsetrainer.core.missed import Path, elsewhere, told_by_the_rest
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.refine import beats, check, whole_current
@@ -24,7 +26,9 @@ _TOLD = 0.65  # of what is missed in a part of the beat, in squares, has to be t
 _UNCERTAIN = 0.007  # of the variance may be left on the new pulse, or it goes where the other never was
 
 
-def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -> Waveform:
+def transfer(
+    drive: Waveform, refined: Waveform, *, slew: float | None = None, names: Sequence[str] = ()
+) -> Waveform:
     """Return a drive that also asks for what refining found missing on another pulse.
 
         ask' = target + E[missed on the path of this drive | missed on the path of the refined one]
@@ -41,6 +45,8 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
         The drive of another pulse, refined on the same device, by the same model.
     slew
         Fastest the current may move, A/s; None: as ``invert``.
+    names
+        Names of the refined drive and of the model of the new one, for messages.
 
     Raises
     ------
@@ -58,7 +64,7 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     >>> pt.transfer(pt.invert("bifid", model, periods=2), refined).inversion
     'transferred'
     """
-    model = check_transfer(drive, refined)
+    model = check_transfer(drive, refined, names)
     part = invertible(model, drive.rate_Hz)
     smooth = learning.LowPass(learning.BAND_HZ, 1.0 / drive.rate_Hz)
     low, high = part.reach
@@ -96,14 +102,15 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     )
 
 
-def check_transfer(drive: Waveform, refined: Waveform) -> Model:
+def check_transfer(drive: Waveform, refined: Waveform, names: Sequence[str] = ()) -> Model:
     """Return the model of both drives; DataError, as of ``transfer``, where nothing can be carried over."""
     model, of_refined = check(drive, passes=1), check_refined(refined)
     if model.fingerprint != of_refined.fingerprint:
+        of_refined_name, name = named(names, (f"the refined {refined.name}", f"the drive of {drive.name}"))
         raise DataError(
-            f"what was learnt on {refined.name} belongs to another model than the one that {drive.name} is "
-            "made with",
-            hint="give the model that the refined drive was made with: pulsetrainer show REFINED.h5 names it",
+            f"{of_refined_name} was made with another model than {name}: what was learnt belongs to that one",
+            hint="give the model that it was made with (pulsetrainer show REFINED.h5 names it), or "
+            "refine a drive of this model",
         )
     if abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
         raise DataError(

@@ -102,7 +102,7 @@ def test_a_broken_bound_is_exit_1_and_names_the_metric(built_small):
     words = ("evaluate", "played-normal-continuous.h5", "--bounds", "tight.toml", "--json")
     done = pulsetrainer(built_small, *words)
     refusal(done, 1, "out of bounds", metric="normal.continuous.mean_error_reduction_percent")
-    assert "1 of 1 bounds of tight.toml is broken" in done.json["error"]["message"]
+    assert "1 of 1 bound in tight.toml not met" in done.json["error"]["message"]
     assert done.json["breaches"][0]["metric"] == "normal.continuous.mean_error_reduction_percent"
     (built_small / "mistyped.toml").write_text("[normal.continuous]\nmean_eror = [0.0, 1.0]\n")
     words = ("evaluate", words[1], "--bounds", "mistyped.toml", "-o", "unknown.h5", "--json")

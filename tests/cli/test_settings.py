@@ -62,6 +62,9 @@ def test_a_wrong_setting_is_refused(run, tmp_path, text, name, names):
     [
         ("current_max_A = 1,2\n", "with a point: current_max_A = 1.2"),
         ('[limits]\nport = "bench:"\n', "put port above [limits]"),
+        ("levels = 4\nlevels = 5\n", "remove one of the two"),
+        ("levels = 4.5\n", "levels = 48"),
+        ("rate_Hz = 0\n", "rate_Hz = 1000.0"),
     ],
 )
 def test_a_slip_in_the_file_is_told_with_its_remedy(run, tmp_path, text, then):
@@ -71,6 +74,32 @@ def test_a_slip_in_the_file_is_told_with_its_remedy(run, tmp_path, text, then):
     assert done.code == 2
     assert then in done.err.partition("  try: ")[2]
     assert "," not in text or text.strip() in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "levels = 1\n",
+            "levels in pulsetrainer.toml (for --levels) must be a whole number, 2 or more, got 1",
+        ),
+        ('port = ""\n', "port in pulsetrainer.toml (for --port) must name a port, got nothing"),
+        ("[limits]\nforce_N = 500\n", "(it comes from limits.force_N in pulsetrainer.toml)"),
+    ],
+)
+def test_a_wrong_value_of_the_file_is_not_laid_on_an_option(run, tmp_path, text, said):
+    """Nobody typed the option, so leaving it out is no advice; where it is typed, it is not the file's."""
+    (tmp_path / "pulsetrainer.toml").write_text(text)
+    done = run(*PLAN)
+    assert said in done.err
+    assert "try: correct it there, or give --" in done.err
+    assert "pulsetrainer.toml" not in run(*PLAN, "--levels", "0").err or "levels" not in text
+
+
+def test_a_setting_that_is_there_twice_is_told_with_its_line(run, tmp_path):
+    """In words, not in those of the reader of TOML."""
+    (tmp_path / "pulsetrainer.toml").write_text("levels = 4\nlevels = 5\n")
+    assert "pulsetrainer.toml sets levels a second time in line 2: levels = 5" in run(*PLAN).err
 
 
 def test_a_wrong_variable_is_named(run):

@@ -54,6 +54,46 @@ def test_every_common_command_works(there, name):
         assert all((there / file).stat().st_size > 100 for file in made), line
 
 
+LOCKED = {
+    "show locked.h5": (3, "you have no permission to read locked.h5", "chmod u+rX locked.h5"),
+    "show closed/run.h5": (3, "you have no permission to read closed/run.h5", "chmod u+rX closed"),
+    "import locked.csv --input u --output y -o a.h5": (
+        3,
+        "permission to read locked.csv",
+        "chmod u+rX locked.csv",
+    ),
+    "--settings locked.toml show run.h5": (2, "permission to read locked.toml", "chmod u+rX locked.toml"),
+    "evaluate played.h5 --bounds locked.toml": (
+        2,
+        "permission to read locked.toml",
+        "chmod u+rX locked.toml",
+    ),
+    "tune -o locked.toml": (2, "permission to read locked.toml", "chmod u+rX locked.toml"),
+    "identify run.h5 -o closed/m.h5": (2, "no permission for the folder closed", "in another place"),
+    "plot run.h5 -o closed/run.png": (2, "no permission for the folder closed", "in another place"),
+}
+
+
+@pytest.mark.skipif(
+    os.geteuid() == 0 and shutil.which("setpriv") is None, reason="root, whom no permission stops"
+)
+@pytest.mark.parametrize("line", LOCKED)
+def test_what_may_not_be_read_or_written_is_told_with_what_to_do(there, line):
+    """In the same words for every file, none of them the system's or the parser's."""
+    for name in ("locked.h5", "locked.csv", "locked.toml"):
+        (there / name).touch(mode=0o000)
+    (there / "closed").mkdir(mode=0o000)
+    as_nobody = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if os.geteuid() == 0 else []
+    done = subprocess.run(
+        [*as_nobody, *PROGRAM, *line.split()], cwd=there, capture_output=True, text=True, check=False
+    )
+    (there / "closed").chmod(0o700)
+    code, said, then = LOCKED[line]
+    assert (done.returncode, "Traceback" in done.stderr) == (code, False), done
+    assert said in done.stderr.partition("  try: ")[0], done
+    assert then in done.stderr.partition("  try: ")[2], done
+
+
 def test_a_figure_needs_no_backend(there):
     """What the environment asks matplotlib for does not matter to a file."""
     assert cold(there, "plot", "model.h5", env=SURROUNDINGS["no such backend"]).code == 0

@@ -34,7 +34,7 @@ def test_rows_with_a_blank_cell_are_left_out_when_asked_and_counted(tmp_path):
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
     assert done.code == 3
     assert "--skip-bad-rows" in done.err
-    assert "blank cell or NaN in column y, line 7 (3 of 300 rows" in done.err
+    assert "a blank cell in column y, line 7 (3 of 300 rows" in done.err
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
     assert done.code == 0, done
     assert "3 of 300 rows" in done.err
@@ -174,7 +174,10 @@ def test_a_single_stroke_says_what_it_is_good_for(tmp_path, rows, little):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda u: np.append(u[:151], u[200:]), "at 3.02 s: if the device"),  # a stroke is missing
+        (
+            lambda u: np.append(u[:151], u[200:]),
+            "3.02 s after its first sample: if the device",
+        ),  # a stroke is missing
         (lambda u: np.where(np.arange(u.size) == 150, 0.0, u), ""),  # a wild sample
         (lambda u: 50.0 * (u > 25.0), ""),  # a square wave
     ],

@@ -211,12 +211,18 @@ def test_announcing_simulations_loads_nothing():
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize(
-    "port", ["bench", "/dev/ttyUSB0", "COM3", "socket://127.0.0.1:9", "/dev/by-path/usb-0:1"]
-)
+@pytest.mark.parametrize("port", ["/dev/ttyUSB0", "COM3", "socket://127.0.0.1:9", "/dev/by-path/usb-0:1"])
 def test_what_names_no_scheme_is_a_serial_port(port):
     """Colons in paths and in the addresses of sockets are no schemes."""
     assert find_opener(port) is None
+
+
+@pytest.mark.parametrize("port", ["bench", "bench?seed=3", "BENCH:", "Bench"])
+def test_a_bench_without_its_colon_or_in_capitals_is_no_serial_port(port):
+    """A dry run opens nothing, and has to refuse it too."""
+    with pytest.raises(DeviceError) as caught:
+        find_opener(port)
+    assert "`port` bench:" in caught.value.hint or "`port` 'bench:?seed=3'" in caught.value.hint
 
 
 def test_an_opened_port_closes_what_runs_behind_it():

@@ -44,6 +44,13 @@ def test_a_signal_is_a_current_in_amperes(tmp_path, heading):
     assert "current_A" in caught.value.hint
 
 
+def test_a_current_below_zero_is_named_by_its_line(tmp_path):
+    """As its writer counts, not by the number of a sample."""
+    (tmp_path / "s.csv").write_text("t_s,current_A\n0,0\n1,-1e-9\n2,-0.5\n")
+    with pytest.raises(DataError, match=r"s\.csv has a current of -0\.5 A in column current_A, line 4"):
+        read_signal(tmp_path / "s.csv", 10.0)
+
+
 def test_a_pulse_of_two_rows_is_refused_with_its_file(tmp_path):
     """And with the number of rows: it has no shape."""
     path = tmp_path / "tiny.csv"
@@ -75,3 +82,7 @@ def test_what_is_no_bound_is_named(tmp_path, bound):
     assert "normal.rms" in str(caught.value)
     assert "bounds.toml" in str(caught.value)
     assert caught.value.hint.startswith("write rms =")
+    path.write_text(f'"normal.rms" = {bound}\n')  # without a heading the whole name has to stand there
+    with pytest.raises(UsageError) as caught:
+        read_bounds(path)
+    assert caught.value.hint.startswith('write "normal.rms" =')

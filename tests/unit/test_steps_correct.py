@@ -17,7 +17,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import base, library
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.correct import _instead as instead
 from wording import raises
 
@@ -243,6 +243,14 @@ def test_where_a_fault_may_be_a_cause_of_the_device_the_advice_says_what_to_reco
     assert said in instead(tied_diagnosis)
     with pytest.raises(DataError, match="nothing to correct"):
         pt.correct(clean, tied_diagnosis)
+
+
+@pytest.mark.parametrize("delay_s", [float("nan"), float("inf"), -0.1])
+def test_a_delay_that_is_no_time_is_refused(clean, delay_s):
+    """NaN compares with nothing, and would be let through to the fit."""
+    found = _diagnosis(clean, "offset-drift", rate=0.1)
+    with pytest.raises(UsageError, match="`delay` must be a finite number, 0 or more"):
+        pt.correct(clean, found, delay_s=delay_s)
 
 
 def test_a_delay_longer_than_the_record_is_refused(clean):

@@ -140,6 +140,14 @@ def test_figures_of_a_fit_are_those_of_an_evaluation_on_its_record():
     assert fit.coverage_percent == 100.0 * np.mean(model.covered)
 
 
+def test_a_run_of_one_sample_is_refused_by_its_name():
+    """Not as a vector of some shape."""
+    run = _run(0.01 * WAVE)
+    one = pt.Run(time_s=np.zeros(1), input=np.ones(1), output=np.ones(1))
+    with pytest.raises(DataError, match="short has one sample"):
+        evaluate(one, identify(run, levels=6, smoothing=0.02), names=["short"])
+
+
 def test_the_name_of_a_file_is_none_of_its_contents():
     """As in a notebook: which function gives what was meant; it was an AttributeError of a text."""
     model, drive = pt.load(FOLDER / "model.h5"), pt.load(FOLDER / "drive.h5")

@@ -85,6 +85,17 @@ def test_what_one_path_says_of_another():
     np.testing.assert_allclose(same.variance, np.diagonal(same.along(same)))
 
 
+def test_a_drive_of_another_model_is_refused_by_the_names_of_both():
+    """What was learnt is what that model lacks."""
+    refined = refine(
+        drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=3), passes=1, slew=SLEW
+    )
+    model = replace(refined.model, offset=refined.model.offset + 0.1)
+    other = replace(drive_of("Coleman-Hodgdon", "bifid"), model=model)
+    with pytest.raises(DataError, match=r"r\.h5 was made with another model than m\.h5"):
+        transfer(other, refined, slew=SLEW, names=("r.h5", "m.h5"))
+
+
 def test_a_device_that_is_its_model_has_nothing_to_carry_over():
     """What is learnt from noise alone changes next to nothing."""
     drive, device = drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=5)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -120,6 +122,37 @@ def test_what_is_no_such_file_is_said(tmp_path, suffix):
         path.write_bytes(data)
         with raises(DataError, "names it", named=path.name):
             read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (
+            {"u": np.arange(5.0), "y": np.arange(6.0)},
+            "u is no column, it has 5 values, where the columns have 6",
+        ),
+        ({"u": np.array(["a", "b"]), "y": np.arange(2.0)}, "u is no column, it has text; columns: y"),
+        ({"u": np.zeros(4, complex)}, "no column of numbers; it has u (complex numbers)"),
+        ({"u": np.zeros((3, 3, 3))}, "no column of numbers; it has u (an array of 3 x 3 x 3)"),
+        ({"y": np.arange(5.0)}, "has no column 'u'; it has a single one, y"),
+    ],
+)
+def test_what_is_no_column_is_said_with_its_reason(tmp_path, content, said):
+    """It is in the file, so that it is not there would be false."""
+    np.savez(tmp_path / "r.npz", **content)
+    with pytest.raises(DataError, match=re.escape(said)):
+        read_table(tmp_path / "r.npz").column("u")
+
+
+@pytest.mark.parametrize("name", ["r.npz", "r.npy", "r.wav"])
+def test_what_a_library_says_to_programmers_is_not_passed_on(tmp_path, name):
+    """Neither numpy's advice to unpickle, nor the form type of a sound."""
+    (tmp_path / name).write_bytes(b"RIFFgarbage of no kind")
+    with pytest.raises(DataError, match="that can be read") as caught:
+        read_table(tmp_path / name)
+    assert not {"pickle", "RIFF form"} & {
+        word for word in ("pickle", "RIFF form") if word in str(caught.value)
+    }
 
 
 def test_objects_are_not_unpickled(tmp_path):
