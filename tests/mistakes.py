@@ -194,6 +194,10 @@ _WORDS_IN_QUOTES = {
 }
 # said unclearly once, tried by hand: each now says what is wrong, and what to do about it
 _WORDS_OF_A_TIRED_HAND = {
+    "a unit of time as an option": (
+        *("import run.csv --input u --output y -o out.h5 --time-unit ms", 2),
+        *("import has no option --time-unit", "write the unit in the heading of the table, such as 't [ms]'"),
+    ),
     "a decimal comma": (
         *("capture identification -o out.h5 --current-max 1,2", 2),
         *("--current-max must be a number, got '1,2'", "with a point and without a unit: 1.2"),

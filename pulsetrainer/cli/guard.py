@@ -177,8 +177,8 @@ def _of_the_system(error: OSError) -> DataError | None:
         )
     if isinstance(error, FileNotFoundError) and error.filename is None:  # of where relative names begin
         return DataError("the folder you are in does not exist any more", hint="go to another one: cd ~")
-    if isinstance(error, PermissionError) and error.filename:
-        return DataError(f"{error.filename}: {error.strerror}", hint="change its permissions")
+    if error.filename and (isinstance(error, PermissionError) or error.errno == errno.EROFS):
+        return DataError(f"{error.filename}: {error.strerror}", hint="make it writable, or use another place")
     if error.filename is None and error.errno in _NOWHERE:
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would fail again

@@ -37,10 +37,11 @@ _NO_COMMAND = {
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
-_NO_MODEL = {
-    "check": "give the model without an option: pulsetrainer check model.h5",
-    "play": "leave it out: a drive holds the model that it was made with",
-    "refine": "leave it out: a drive holds the model that it was made with",
+_NO_OPTION = {
+    "check --model": "give the model without an option: pulsetrainer check model.h5",
+    "play --model": "leave it out: a drive holds the model that it was made with",
+    "refine --model": "leave it out: a drive holds the model that it was made with",
+    "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
@@ -64,8 +65,7 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
             hint = f"put it before the command: pulsetrainer --settings FILE{behind}"
         elif given == "--json" and command == "pulsetrainer":
             hint = "put it after the command: pulsetrainer show FILE.h5 --json"
-        elif given == "--model":
-            hint = _NO_MODEL.get(command.rpartition(" ")[2], hint)
+        hint = _NO_OPTION.get(f"{command.rpartition(' ')[2]} {given}", hint)
         return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)

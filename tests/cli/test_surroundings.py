@@ -128,16 +128,18 @@ def test_without_a_home_a_library_says_nothing_about_it(there):
     assert (done.code, done.err) == (0, "")
 
 
-def test_what_may_not_be_written_is_no_bug(monkeypatch):
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS])
+def test_what_may_not_be_written_is_no_bug(monkeypatch, number):
     """Such as the file of a shell that --install-completion wants to extend."""
 
     def program(**_words):
-        raise PermissionError(errno.EACCES, "Permission denied", "/home/x/.bashrc")
+        raise OSError(number, os.strerror(number), "/home/x/.bashrc")
 
     said = io.StringIO()
     monkeypatch.setattr("sys.stderr", said)
     assert funnel(program, ["--install-completion"]) == 3
-    assert "error: /home/x/.bashrc: Permission denied" in said.getvalue()
+    assert f"error: /home/x/.bashrc: {os.strerror(number)}" in said.getvalue()
+    assert "try: make it writable" in said.getvalue()
     assert "bug" not in said.getvalue()
 
 
