@@ -46,7 +46,8 @@ RATE = (
 # of what is found at the fast end of what a record shows
 FASTER = (
     " A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart). "
-    "To know what it is, record {experiment}{often}{lasting}. Then diagnose that recording.{command}"
+    "To know what it is, record {experiment}{often}{lasting}, if device and recorder can be so fast. Then "
+    "diagnose that recording.{command}"
 )
 _NOTHING_ELSE = ("lacks", "again")  # advice that a faster record takes the place of
 # after what can be done with the records as they are
@@ -142,8 +143,9 @@ ADVICE: Mapping[str, str] = {
         "correct."
     ),
     "rest first": (
-        "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "
-        "then record the same again and diagnose that: what was found can then be added to the model."
+        "The device was still settling when these recordings began, or had never been cycled. Cycle it once "
+        "through its whole range, let it rest for {rest} where they begin, then record the same again and "
+        "diagnose that: what was found can then be added to the model. The rest need not be recorded."
     ),
     "again": (
         "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
@@ -347,7 +349,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     else:
         told = "" if faster_too and one.kind in _NOTHING_ELSE else ADVICE[one.kind]
         told += ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else ""
-    told = told + FASTER if faster_too else _with_what_lacks(told, lacked)
+    told = _with_what_lacks(told + FASTER * faster_too, lacked)
     said = told.format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
@@ -358,7 +360,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         experiment=EXPERIMENTS[played].format(**numbers),
         often=bench.often(played, faster),
         lasting=bench.lasting(played, faster),
-        missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
+        missing="; ".join(MISSING[name].format(**bench.numbers()) for name in names if name in MISSING),
         command=(OURS if bench.ours else TABLE).format(**numbers),
         **{name: bench.time(value) if name in _TIMES else value for name, value in one.figures.items()},
     )

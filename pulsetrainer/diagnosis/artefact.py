@@ -163,7 +163,14 @@ def _words(given: Given) -> Words:
 
 
 def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, estimate: bool = False) -> float:
-    """Rms error of a model, as given or extended, over the single samples with weight, as measured.
+    """Rms error of a model, as given or extended, over the single samples with weight: see ``errors_of``."""
+    return root_mean_square(np.concatenate(errors_of(state, model, faults, estimate=estimate)))
+
+
+def errors_of(
+    state: State, model: Model, faults: Sequence[FloatArray] = (), *, estimate: bool = False
+) -> list[FloatArray]:
+    """Errors of a model at the samples with weight of each record (n,), as measured.
 
     ``faults`` holds what faults of the measurement did to each record (n,), which is no error of a model.
     ``estimate``: a model without extensions begins, as in `evaluate`, where it predicts best; else at rest.
@@ -180,7 +187,20 @@ def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, est
         said = followed(model, masked, question.stamps[k] if question.stamps else None, start)
         fault = faults[k] if faults else 0.0
         errors.append((said + fault - own.output)[masked.counts])
-    return root_mean_square(np.concatenate(errors))
+    return errors
+
+
+def with_its_offset(state: State, model: Model, faults: Sequence[FloatArray]) -> Model:
+    """Return a model whose mean error on the first record, of which it goes on, is not relevant.
+
+    A cause that acts on the gain does so about the output of empty memory, which lies elsewhere on the levels
+    of the model than on those of the search. The dual form has no offset of its output.
+    """
+    mean = float(np.mean(errors_of(state, model, faults)[0]))
+    relevant = state.floor.relevant / state.floor.count * state.scale.span**2
+    return (
+        replace(model, offset=model.offset - mean) if model.form != "dual" and mean**2 > relevant else model
+    )
 
 
 def faults_of(state: State) -> tuple[Term, ...]:

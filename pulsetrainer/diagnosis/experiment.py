@@ -17,6 +17,7 @@ from pulsetrainer.core.excitations import through
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
@@ -73,10 +74,19 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
 
 
 def fastest_of(state: State, names: Sequence[str]) -> float | None:
-    """Return the shortest time of these causes, s of the records, where it is as fast as the samples."""
-    terms = [term for term in state.current.terms if term.cause.id in names]
-    times = (fast_s(term, state.problem.frames[0]) for term in terms)
+    """Return the shortest time of these causes, s of the records, where it is as fast as the samples.
+
+    A filter of no time at all is none.
+    """
+    frame = state.problem.frames[0]
+    terms = [term for term in state.current.terms if term.cause.id in names and _takes_time(term, frame)]
+    times = (fast_s(term, frame) for term in terms)
     return min((tau for tau in times if tau is not None), default=None)
+
+
+def _takes_time(term: Term, frame: Frame) -> bool:
+    bounds = term.cause.quantities(frame)
+    return any(one.unit == "s" and value >= one.small for value, one in zip(term.values, bounds, strict=True))
 
 
 def as_fast_as(tau: float | None) -> float:

@@ -137,8 +137,7 @@ TEXTS: Mapping[str, str] = {
     ),
     "no gain": (
         "Extended by {names} and started from rest, the model would predict these recordings hardly better "
-        "than as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to "
-        "it."
+        "than without ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
     ),
     "in the model": (
         "The model as given contains {names} already. Fitted again to these recordings and started from "
@@ -146,12 +145,12 @@ TEXTS: Mapping[str, str] = {
         "{given:.3g} %. So nothing is added to it."
     ),
     "no better": (
-        "Extended by {names} and started from rest, the model would predict these recordings worse than as "
-        "it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
+        "Extended by {names} and started from rest, the model would predict these recordings worse than "
+        "without ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
     ),
     "under way": (
-        "Extended by {names} and started from rest, the model would predict these recordings worse than as "
-        "it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it. It "
+        "Extended by {names} and started from rest, the model would predict these recordings worse than "
+        "without ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it. It "
         "describes them only if their starting state is left free: the device was still settling from what "
         "came before."
     ),

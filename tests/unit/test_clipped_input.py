@@ -157,7 +157,7 @@ def _run(u, y):
     return pt.Run(time_s=0.01 * np.arange(u.size), input=u, output=y)
 
 
-@pytest.mark.parametrize("quick", [True, False])
+@pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_nothing_else_is_sought_in_such_a_record(quick):
     """A rate of 1 and a clipped peak had been `rate-widening` and `viscous`, which were not there."""
     swing = np.repeat([1.0, 0.7, 1.0, 0.9, 0.5], 2 * SAMPLES)

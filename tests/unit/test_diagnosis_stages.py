@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.artefacts.model import Extension
+from pulsetrainer.artefacts.model import Extension, Model
 from pulsetrainer.diagnosis import artefact, design, fitting, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
@@ -1864,6 +1864,48 @@ def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
     assert begin._told_by_both(told, second) == told  # it is said once
 
 
+def _in_use(monkeypatch, within=100.0):
+    """The error of a static model that is fitted to the records is 11 of averages, and this within them."""
+    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
+    monkeypatch.setattr(extension, "with_its_offset", lambda state, model, faults: model)
+    monkeypatch.setattr(extension, "_within_averages", lambda fitted: within)
+
+
+@pytest.mark.parametrize(
+    ("times", "form", "moves"),
+    [(1.01, "direct", True), (-1.01, "signed", True), (0.99, "direct", False), (1.01, "dual", False)],
+)
+def test_the_zero_of_an_extended_model_is_that_of_the_first_record(monkeypatch, times, form, moves):
+    """Where its mean error is relevant; that of later records may be their own."""
+    state = _state(_fit(500.0))
+    mean = times * np.sqrt(state.floor.relevant / state.floor.count) * state.scale.span
+    errors = [np.full(5, mean), np.full(9, 50.0)]
+    monkeypatch.setattr(artefact, "errors_of", lambda state, model, faults: errors)
+    given = Model(np.asarray([0.0, 1.0]), np.ones(1), 1.0, np.ones(1, dtype=bool), form=form)
+    found = artefact.with_its_offset(state, given, [])
+    assert found.offset == pytest.approx(1.0 - mean * moves)
+
+
+@pytest.mark.parametrize(
+    ("within", "said"), [(92.86, None), (92.79, "no gain"), (89.0, "under way"), (-0.05, "under way")]
+)
+def test_an_extended_model_predicts_its_records_better_than_a_static_one_that_was_fitted_to_them(
+    monkeypatch, within, said
+):
+    """A model that knows the heat predicts a record that begins warm so badly that any fit is better."""
+    _in_use(monkeypatch, within)
+    monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
+    monkeypatch.setattr(extension, "rms_of", lambda state, model, known: {"extended": 10.01}.get(model, 50))
+    begun = SimpleNamespace(bins=SimpleNamespace(begins_free=True))
+    state = _state(replace(_fit(500.0), terms=(Term(CAUSE["creep"], (0.1, 3.0)),), problem=begun))
+    state = replace(state, repeated=state.current, question=replace(state.question, given=Given(GIVEN)))
+    found = extension.stage(state)
+    assert found.extended == (None if said else "extended")
+    assert [one.kind for one in found.evidence] == ([said] if said else [])
+    if said:
+        assert found.evidence[0].figures["given"] == pytest.approx(np.sqrt(within + 11.0))
+
+
 @pytest.mark.parametrize(
     ("after", "free", "tau", "said"),
     [
@@ -1877,7 +1919,7 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
     What is worse, and described its records only with a free beginning, was under way before them, unless it
     is over at once.
     """
-    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
+    _in_use(monkeypatch)
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
     begun = SimpleNamespace(bins=SimpleNamespace(begins_free=free))
@@ -1904,7 +1946,7 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
 )
 def test_what_the_model_as_given_contains_is_not_news(monkeypatch, before, after, contains, said):
     """A model that was extended by creep was diagnosed as one without."""
-    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
+    _in_use(monkeypatch)
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(
         extension, "rms_of", lambda state, model, known: after if model == "extended" else before
@@ -1929,7 +1971,7 @@ def test_what_only_equal_loops_show_costs_no_extension(monkeypatch, shown, gains
     def with_names(state, model):
         return tuple(term.cause.id for term in state.extensions)
 
-    monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
+    _in_use(monkeypatch)
     monkeypatch.setattr(extension, "extended_model", with_names)
     rms = {"given": 10.0, ("creep",): 9.0 if gains else 10.0, ("creep", "load-dependence"): 10.0}
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: rms[model])

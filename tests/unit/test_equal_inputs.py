@@ -51,6 +51,7 @@ def _recorded(u: np.ndarray, seed: int, gain: np.ndarray | float = 1.0, *, branc
     return pt.Run(np.arange(u.size) / RATE_HZ, u, y + 0.002 * np.ptp(y) * noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("branches", "said"), [(True, AGAIN), (False, DIFFERS)])
 def test_a_device_that_does_the_same_again_is_told_from_one_on_which_something_acts(branches, said):
     """Loops that no Preisach model has, the same twice; a gain that a hidden temperature changes."""

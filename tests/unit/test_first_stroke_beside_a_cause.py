@@ -42,7 +42,8 @@ def _lagged(y: np.ndarray, tau_s: float) -> np.ndarray:
     return signal.lfilter([1.0 - a], [1.0, -a], y, zi=[a * y[0]])[0]
 
 
-@pytest.mark.parametrize("cycled", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("cycled", [True, False])
 def test_a_first_stroke_that_creep_hides_is_left_out_once_the_creep_is_known(cycled):
     """Then the creep has its own strength again; of a cycled device no sample is lost."""
     u, y = _record(cycled=cycled)

@@ -37,7 +37,8 @@ def _record(rng: np.random.Generator, moved: float) -> pt.Run:
     return pt.Run(time_s=STEP_S * np.arange(u.size), input=u, output=noisy)
 
 
-@pytest.mark.parametrize("moved", [pytest.param(0.0, marks=pytest.mark.slow), MOVED])
+@pytest.mark.slow
+@pytest.mark.parametrize("moved", [0.0, MOVED])
 def test_a_zero_that_heat_moves_is_found_only_where_it_moves(moved):
     """The loss, the time constant and the shift lie within their intervals, or there is no shift."""
     run = _record(np.random.default_rng(3), moved)

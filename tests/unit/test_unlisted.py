@@ -197,6 +197,7 @@ def test_a_dip_over_the_average_current_is_found_and_said(dipping):
     assert (curve.unit, curve.output_unit) == ("A", "N")
 
 
+@pytest.mark.slow
 def test_a_gain_that_depends_on_the_speed_is_found_and_said():
     """In words and per cent, and as a part of a model that predicts another run; the inverse undoes it."""
 

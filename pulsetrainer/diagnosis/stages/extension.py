@@ -2,9 +2,9 @@
 
 The search judges a model on averages, with a free offset and a free beginning. The model that will be used
 has levels of its own, and starts from rest. It is made here. It must predict these same records better than
-the model as given, by at least three fifths of what the causes gain in the search; otherwise nothing is
-added. A cause that gains less was already under way before the record, and will begin differently in the next
-one.
+the model as given, and better than a static model that was fitted to them, by at least three fifths of what
+the causes gain in the search; otherwise nothing is added. A cause that gains less was already under way
+before the record, and will begin differently in the next one.
 
 If the model as given contains these causes already, and is no worse, that is said. A fault of the measurement
 that can be taken out of the records counts on neither side of the comparison. Equal loops show a cause by
@@ -16,10 +16,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from pulsetrainer.artefacts import Model
-from pulsetrainer.diagnosis.artefact import extended_model, faults_of, percent_of_samples, rms_of, undone
+from pulsetrainer.diagnosis.artefact import (
+    extended_model,
+    faults_of,
+    percent_of_samples,
+    rms_of,
+    undone,
+    with_its_offset,
+)
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.stages import begin
 from pulsetrainer.diagnosis.stages.repetition import DOUBT
 from pulsetrainer.diagnosis.state import State
@@ -40,25 +49,36 @@ def stage(state: State) -> State:
 
 
 def _extended(state: State, given: Model) -> State:
-    extended = extended_model(state, given)
     assert state.repeated is not None
     known, faults = undone(state), faults_of(state)
+    extended = with_its_offset(state, extended_model(state, given), known)
     before, after = rms_of(state, given, known), rms_of(state, extended, known)
     plain = refit(state.problem, faults, state.repeated) if faults else state.baseline
     gained = (plain.squares - state.repeated.squares) / state.floor.count
-    if before**2 - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
+    # a model that has the heat already predicts a record that begins warm worse than any other
+    static = plain.squares / state.floor.count + _within_averages(state.repeated)
+    beaten = min(before**2, static * state.scale.span**2)
+    if beaten - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
-    percent = percent_of_samples(state)
-    figures = {"given": percent * before, "extended": percent * after}
     names = tuple(term.cause.id for term in state.extensions)
     rest = _rest(state)
     relevant = state.floor.relevant / state.floor.count * state.scale.span**2
     if before**2 - after**2 <= relevant and set(names) <= {one.cause for one in given.extensions}:
-        kind = "in the model"
+        kind, against = "in the model", before
     else:
-        kind = _why_not(state, after <= before, rest)
-    said = Evidence(kind, figures=figures | {"rest": rest}, names=names)
+        kind, against = _why_not(state, after**2 <= beaten, rest), float(np.sqrt(beaten))
+    percent = percent_of_samples(state)
+    figures = {"given": percent * against, "extended": percent * after, "rest": rest}
+    said = Evidence(kind, figures=figures, names=names)
     return replace(state, repeated=None, evidence=(*state.evidence, said))
+
+
+def _within_averages(fitted: Fitted) -> float:
+    """Mean square of what a fit leaves of single samples beyond what it leaves of their averages."""
+    bins, simulated = fitted.problem.bins, fitted.simulator.full(fitted.terms)
+    left = [record.output - y for record, y in zip(fitted.problem.records, simulated, strict=True)]
+    variance = bins.average([one**2 for one in left]) - bins.average(left) ** 2
+    return float(np.average(variance, weights=bins.sizes))
 
 
 def _why_not(state: State, better: bool, rest: float) -> str:
