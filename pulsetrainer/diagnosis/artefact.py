@@ -170,7 +170,7 @@ def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, est
 def errors_of(
     state: State, model: Model, faults: Sequence[FloatArray] = (), *, estimate: bool = False
 ) -> list[FloatArray]:
-    """Errors of a model at the samples with weight of each record (n,), as measured.
+    """Errors of a model at the samples with weight of each record (n,), of an output that rises.
 
     ``faults`` holds what faults of the measurement did to each record (n,), which is no error of a model.
     ``estimate``: a model without extensions begins, as in `evaluate`, where it predicts best; else at rest.
@@ -198,9 +198,9 @@ def with_its_offset(state: State, model: Model, faults: Sequence[FloatArray]) ->
     """
     mean = float(np.mean(errors_of(state, model, faults)[0]))
     relevant = state.floor.relevant / state.floor.count * state.scale.span**2
-    return (
-        replace(model, offset=model.offset - mean) if model.form != "dual" and mean**2 > relevant else model
-    )
+    if model.form == "dual" or mean**2 <= relevant:
+        return model
+    return replace(model, offset=model.offset - model.polarity * mean)
 
 
 def faults_of(state: State) -> tuple[Term, ...]:

@@ -1873,7 +1873,13 @@ def _in_use(monkeypatch, within=100.0):
 
 @pytest.mark.parametrize(
     ("times", "form", "moves"),
-    [(1.01, "direct", True), (-1.01, "signed", True), (0.99, "direct", False), (1.01, "dual", False)],
+    [
+        (1.01, "direct", 1),
+        (-1.01, "signed", 1),
+        (0.99, "direct", 0),
+        (1.01, "dual", 0),
+        (1.01, "falling", -1),
+    ],
 )
 def test_the_zero_of_an_extended_model_is_that_of_the_first_record(monkeypatch, times, form, moves):
     """Where its mean error is relevant; that of later records may be their own."""
@@ -1881,7 +1887,8 @@ def test_the_zero_of_an_extended_model_is_that_of_the_first_record(monkeypatch, 
     mean = times * np.sqrt(state.floor.relevant / state.floor.count) * state.scale.span
     errors = [np.full(5, mean), np.full(9, 50.0)]
     monkeypatch.setattr(artefact, "errors_of", lambda state, model, faults: errors)
-    given = Model(np.asarray([0.0, 1.0]), np.ones(1), 1.0, np.ones(1, dtype=bool), form=form)
+    kind = {"polarity": -1} if form == "falling" else {"form": form}
+    given = Model(np.asarray([0.0, 1.0]), np.ones(1), 1.0, np.ones(1, dtype=bool), **kind)
     found = artefact.with_its_offset(state, given, [])
     assert found.offset == pytest.approx(1.0 - mean * moves)
 
