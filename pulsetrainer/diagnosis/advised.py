@@ -32,6 +32,11 @@ WHICHEVER = (
     "(pulsetrainer correct), and go on with the corrected one: it is right either way, but for what the "
     "causes differ by. "
 )
+# ... of tied causes one of which may be the device's
+FIRST = (
+    "Take {removed} out of the recording (pulsetrainer correct), and go on with the corrected one: that much "
+    "is certain. "
+)
 MAINS = "{mains:.4g} Hz is a frequency of the mains, so a hum is likely. "
 # of tied causes, beside a model that was extended by what was found
 EXTENDED = (
@@ -343,7 +348,8 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     lacked = [name for name in names if name in LACKS]
     faults = [name for name in names if name not in LACKS and library()[name].corrects]
     if one.kind in _TIED:
-        begins = EXTENDED if command == "extend" else WHICHEVER if command == "correct" else ""
+        removable = WHICHEVER if len(faults) == len(names) else FIRST
+        begins = {"extend": EXTENDED, "correct": removable}.get(command, "")
         told = (MAINS if "mains" in one.figures else "") + begins + ADVICE[one.kind]
         told += KNOWN if 0 < len(faults) < len(names) else ""
     else:

@@ -258,6 +258,7 @@ class Thresholds:
     rate_samples: int = 3  # on each side, at least, in that average
     groups: int = 10  # by level, and by time
     told_effect: float = 0.1  # of the span: that a record could have shown a larger effect is no news
+    largest_told: float = 100.0  # times the smallest: where that is nothing, the figure says no more
     largest_at: float = 1.5  # times the smallest of the groups: below it the residual is the same everywhere
     welch: int = 4096  # averages in one spectrum
     slow_quantile: float = 0.1  # of the way, or of the time: strokes up to here are slow ...

@@ -14,6 +14,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
+_NOTHING = 1e-3  # of an interval: a value of less is rounding
 _CURVE = re.compile(r"[fg]\d+")  # the values of a learned curve, of a gain: one by one they say nothing
 _OF_A_CURVE = ("state", "low", "high")
 DRAWN = "the report (--html) draws it"
@@ -155,7 +156,8 @@ def parameter(one: Parameter) -> str:
     half = max(one.upper - one.value, one.value - one.lower)
     between = f"{low} to {high}" if low != high else f"± {half:.1g}"  # "7 to 7" would tell nothing
     interval = f" (95 %: {between})" if known else ""
-    return with_unit(f"{one.value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
+    value = one.value if not known or abs(one.value) > _NOTHING * (one.upper - one.lower) else 0.0
+    return with_unit(f"{value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
 
 
 def _said(one: Cause) -> dict[str, str]:

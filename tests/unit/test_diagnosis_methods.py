@@ -1039,6 +1039,10 @@ def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
     if kind in ("tied", "tied, no better"):
         assert ("outliers and periodic out" in said) is (command == "correct")
         assert ("pulsetrainer extend" in said) is (command == "extend")
+        assert ("does not belong in a model" in said) is (command == "correct")
+        of_the_device = replace(one, names=(*names[:-1], "viscous"))
+        said = advised.advice(of_the_device, advised.Bench(Scale(), "A"), command, ["periodic"])
+        assert "does not belong in a model" not in said
         at_50 = replace(one, figures={**one.figures, "mains": 50.02})
         assert "50.02 Hz" in advised.advice(at_50, advised.Bench(Scale(), "A"), command, ["periodic"])
 

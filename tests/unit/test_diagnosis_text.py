@@ -121,6 +121,8 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     )  # a file of 0.1, a quick screen
     narrow = parameters([Parameter("f", 7.0, "Hz", 6.9999, 7.0003)])
     assert narrow["f"] == "7 Hz (95 %: ± 0.0003)"  # "7 to 7" told nothing
+    none = parameters([Parameter("filter", 6.6e-15, "s", 0.0, 0.0033)])
+    assert none["filter"] == "0 s (95 %: 0 to 0.0033)"
 
 
 def test_what_was_measured_comes_before_what_was_chosen():

@@ -100,4 +100,6 @@ def _largest(state: State) -> Iterator[Evidence]:
             at, name = float(state.scale.places(group.at, group.unit)[k]), group.name
             if name == "rate":
                 at, name = at * state.scale.reach, "rest" if k == 0 else name
-            yield Evidence("largest", figures={"at": at, "times": most / least}, names=(name,))
+            yield Evidence(
+                "largest", figures={"at": at, "times": min(most / least, LIMITS.largest_told)}, names=(name,)
+            )
