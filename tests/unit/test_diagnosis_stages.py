@@ -1894,17 +1894,22 @@ def test_the_zero_of_an_extended_model_is_that_of_the_first_record(monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    ("within", "said"), [(92.86, None), (92.79, "no gain"), (89.0, "under way"), (-0.05, "under way")]
-)
+    ("within", "also", "said"),
+    [
+        (92.86, (), None), (92.79, (), "no gain"), (89.0, (), "under way"), (-0.05, (), "under way"),
+        (89.0, ("condition-change",), None),  # a later record has a zero of its own, and no model has both
+    ],
+)  # fmt: skip
 def test_an_extended_model_predicts_its_records_better_than_a_static_one_that_was_fitted_to_them(
-    monkeypatch, within, said
+    monkeypatch, within, also, said
 ):
     """A model that knows the heat predicts a record that begins warm so badly that any fit is better."""
     _in_use(monkeypatch, within)
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: {"extended": 10.01}.get(model, 50))
     begun = SimpleNamespace(bins=SimpleNamespace(begins_free=True))
-    state = _state(replace(_fit(500.0), terms=(Term(CAUSE["creep"], (0.1, 3.0)),), problem=begun))
+    terms = (Term(CAUSE["creep"], (0.1, 3.0)), *_fit(500.0, *also).terms)
+    state = _state(replace(_fit(500.0), terms=terms, problem=begun))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given(GIVEN)))
     found = extension.stage(state)
     assert found.extended == (None if said else "extended")

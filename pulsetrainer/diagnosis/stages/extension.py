@@ -27,6 +27,7 @@ from pulsetrainer.diagnosis.artefact import (
     undone,
     with_its_offset,
 )
+from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.stages import begin
@@ -55,9 +56,13 @@ def _extended(state: State, given: Model) -> State:
     before, after = rms_of(state, given, known), rms_of(state, extended, known)
     plain = refit(state.problem, faults, state.repeated) if faults else state.baseline
     gained = (plain.squares - state.repeated.squares) / state.floor.count
-    # a model that has the heat already predicts a record that begins warm worse than any other
-    static = plain.squares / state.floor.count + _within_averages(state.repeated)
-    beaten = min(before**2, static * state.scale.span**2)
+    beaten = before**2
+    if (
+        ConditionChange.id not in state.repeated.names
+    ):  # else what was fitted has the later records' own zeros
+        # a model that has the heat already predicts a record that begins warm worse than any other
+        static = plain.squares / state.floor.count + _within_averages(state.repeated)
+        beaten = min(beaten, static * state.scale.span**2)
     if beaten - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
     names = tuple(term.cause.id for term in state.extensions)
