@@ -108,17 +108,15 @@ class DamagedFileError(DataError):
 class NotAnArtefactError(DataError):
     """A file that this program did not write; ``foreign``: an HDF5 file, which cannot be imported either."""
 
-    foreign_hint: ClassVar[str] = "export it as CSV with the program that wrote it, and import that: "
-    foreign_hint += "pulsetrainer import FILE.csv --input COLUMN --output COLUMN -o run.h5"
+    foreign_hint: ClassVar[str] = (
+        "export it as CSV with the program that wrote it, and import that: "
+        "pulsetrainer import FILE.csv --input COLUMN --output COLUMN -o run.h5"
+    )
 
     def __init__(self, message: str, *, path: Path | str, foreign: bool = False) -> None:
-        table = f"pt.read_table({str(path)!r}, input=..., output=...)"
-        super().__init__(
-            message,
-            hint=self.foreign_hint
-            if foreign
-            else f"give a file that pulsetrainer wrote; of a table: {table}",
-        )
+        own = "give a file that pulsetrainer wrote; of a table: "
+        own += f"pt.read_table({str(path)!r}, input=..., output=...)"
+        super().__init__(message, hint=self.foreign_hint if foreign else own)
         self.foreign = foreign
         self.path = Path(path)
 

@@ -49,6 +49,11 @@ def say(lead: str, text: str) -> None:
     sys.stderr.write(tables.folded(lead, whole, width, indent=2).replace(_KEPT, " ") + "\n")
 
 
+def shows_unicode() -> bool:
+    """Tell whether stderr, where live views are drawn, can show more than ASCII."""
+    return (sys.stderr.encoding or "").lower().startswith("utf")
+
+
 @contextmanager
 def drawing() -> Iterator[Callable[[RenderableType], None]]:
     """Give what draws on the terminal, each time in the place of what it drew before; gone at the end."""

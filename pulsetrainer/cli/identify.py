@@ -10,7 +10,7 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
-from pulsetrainer.steps.arguments import MOST_LEVELS, check_once
+from pulsetrainer.steps.arguments import MOST_FITTED, check_once
 
 Reading = Literal["continuous", "relay"]
 
@@ -26,7 +26,7 @@ def identify(
             "--levels",
             "Levels of the Preisach plane; default: 48, fewer for a short record.",
             min=2,
-            max=MOST_LEVELS,
+            max=MOST_FITTED,
         ),
     ] = None,
     form: Annotated[

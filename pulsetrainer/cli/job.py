@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.console import Screen, plain, shows_unicode
 from pulsetrainer.cli.next_step import as_options, with_files
 from pulsetrainer.cli.outputs import check_ending, check_keeps_inputs
 from pulsetrainer.errors import UsageError
@@ -146,7 +146,7 @@ class Job:
         from pulsetrainer.cli.loop_view import SMALLEST, LoopView
 
         view = LoopView(*ends)
-        if view.fits and (sys.stderr.encoding or "").lower().startswith("utf"):
+        if view.fits and shows_unicode():
             return view
         least = " x ".join(map(str, SMALLEST))
         self.screen.note(f"no live view: it needs a terminal of {least} characters that shows Unicode")

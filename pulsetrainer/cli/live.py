@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.cli.console import drawing
+from pulsetrainer.cli.console import drawing, shows_unicode
 from pulsetrainer.report.characters import BARS, PLAIN_BARS, plotted
 from pulsetrainer.steps.steering import keys_in
 
@@ -67,8 +67,7 @@ class Live:
             return Text(f"{self._status(now.time_s)}\n{choices}  Q stop")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
         force = np.concatenate(self._traces)
-        spelled = (sys.stderr.encoding or "").lower().startswith("utf")
-        lines = plotted(force, width, _ROWS, BARS if spelled else PLAIN_BARS)
+        lines = plotted(force, width, _ROWS, BARS if shows_unicode() else PLAIN_BARS)
         beat = now.beat
         said = (
             f"{100 * self._share:3.0f} %  {now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"

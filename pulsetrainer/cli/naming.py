@@ -74,6 +74,9 @@ class Command(TyperCommand):
                 )
         for one in self.params:
             _check_names(one, typed.get(one.name or ""))
+            kind: Any = one.type
+            if kind.name == "path":
+                kind.readable = False  # else the parser tells of it, in words of its own
         left = super().parse_args(ctx, args)
         check_finite(ctx)
         return left
@@ -119,8 +122,6 @@ def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
 
 def _check_names(parameter: Any, typed: Any) -> None:
     """UsageError for a file without a name, as a script leaves it, or an option in the place of one."""
-    if parameter.type.name == "path":
-        parameter.type.readable = False  # that it is not, is told as of any other file that cannot be used
     for name in typed if isinstance(typed, list | tuple) else (typed,):
         if parameter.type.name != "path" or not isinstance(name, str):
             continue

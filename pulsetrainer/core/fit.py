@@ -95,13 +95,15 @@ def fit(
     with another form than direct.
     """
     forms = asked_forms(form, signals, low, high, kept, plain=reading == "continuous" and method == "joint")
+    records = records_of(signals, low, high, kept)
     if "direct" not in forms:
         fits = [
-            (_dual if one == "dual" else _signed)(signals, low, high, n_h, smoothing, kept, levels)
+            _signed(records, levels or plane_for(records, low, high, n_h), smoothing)
+            if one == "signed"
+            else _dual(records, _swapped(signals, n_h, smoothing, kept, levels))
             for one in forms
         ]
         return fits[-1] if fits[-1].misfit < BETTER * fits[0].misfit else fits[0]
-    records = records_of(signals, low, high, kept)
     even = Plane.uniform(low, high, n_h)
     plane = levels or (even if reading == "relay" else plane_for(records, low, high, n_h))
     offsets = offsets_between(records, plane, reading)
@@ -119,36 +121,23 @@ def fit(
     return fitted
 
 
-def _signed(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Kept,
-    levels: Plane | None,
-) -> Fitted:
+def _signed(records: Sequence[Record], plane: Plane, smoothing: Smoothing) -> Fitted:
     """Fit weights of either sign."""
-    records = records_of(signals, low, high, kept)
-    plane = levels or plane_for(records, low, high, n_h)
     found = identify(records, plane, smoothing=smoothing, signed=True)
     return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
 
-def _dual(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Kept,
-    levels: Plane | None,
-) -> Fitted:
-    """Fit the operator from output to input: first to the input, then where the noise is."""
+def _swapped(
+    signals: Signals, n_h: int, smoothing: Smoothing, kept: Kept, levels: Plane | None
+) -> Identified:
+    """Fit the operator from output to input, to the input."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    found = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept, levels=levels).identified
-    records = tuple(records_of(signals, low, high, kept))
+    return fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept, levels=levels).identified
+
+
+def _dual(records: Sequence[Record], found: Identified) -> Fitted:
+    """Return the dual form of an operator from output to input, fitted again where the noise is."""
     if not found.stiffness:  # else it describes the record poorly, in whatever variable
         found = replace(found, operator=in_output(found.operator, records, found.smoothing))
-    return Fitted(found, records, np.zeros(len(records)), "dual")
+    return Fitted(found, tuple(records), np.zeros(len(records)), "dual")

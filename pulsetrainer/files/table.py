@@ -25,7 +25,7 @@ from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.csv_cells import number
-from pulsetrainer.files.csv_dialect import Dialect, column_words, detect, ends_in_a_number
+from pulsetrainer.files.csv_dialect import Dialect, cell_at, column_words, detect, ends_in_a_number
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
 
@@ -119,10 +119,7 @@ class Table:
 
     def _cell(self, name: str, row: int) -> str:
         """Return what stands in the cell of a text that is no number."""
-        dialect = detect(self.path)
-        with self.path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
-            cells = dialect.split(next(islice(stream, self.line_of(row) - 1, None), "").rstrip("\n"))
-        cell = "".join(cells[self.index(name) :][:1])
+        cell = cell_at(self.path, self.line_of(row), self.index(name))
         value = number(cell)
         overload = " (an overload)" if value is not None and np.isfinite(value) else ""
         return f"{cell!r}{overload}" if cell else "a blank cell"

@@ -14,7 +14,7 @@ from pulsetrainer.errors import ArgumentError, UsageError
 
 EXCITATIONS = ("identification", "diagnostic")
 _NUMBERS = {"int", "float", "int | None", "float | None"}
-MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
+MOST_FITTED = 500  # levels: 400 take three minutes and 1.4 GB
 
 
 def check_beat(beat: str | int | None) -> None:
@@ -166,7 +166,7 @@ def _kinds_in(annotation: str) -> tuple[tuple[type, ...], tuple[type, ...]]:
     return tuple(known[word] for word in alone), tuple(known[word] for word in each)
 
 
-def check_levels(levels: int | None, most: int = MOST_LEVELS) -> None:
+def check_levels(levels: int | None, most: int = MOST_FITTED) -> None:
     """Raise ArgumentError for what is no number of levels; None is no choice."""
     if levels is not None and (not 2 <= levels <= most or levels != int(levels)):
         raise ArgumentError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 
 import h5py
 import pytest
@@ -183,6 +184,16 @@ def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
     with h5py.File(tmp_path / "played.h5") as file:
         peak = max(file["compensated/reference"][()].max(), file["scaled/reference"][()].max())
     assert plan["peak_current_A"] == pytest.approx(peak, abs=2e-4)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=lambda one: one.key)
+def test_the_example_of_a_setting_is_what_the_commands_take_without_it(setting):
+    """Who obeyed it got a capture of thirteen samples."""
+    parameters = [p for one in typer.main.get_command(app).commands.values() for p in one.params]
+    usual = [p.default for p in parameters if p.envvar == setting.variable and p.default is not None]
+    value = tomllib.loads(f"usual = {setting.usual}")["usual"]
+    assert type(value) is setting.kind
+    assert set(usual) <= {value}
 
 
 def test_every_setting_reaches_all_commands_that_take_it():

@@ -57,10 +57,9 @@ def _extended(state: State, given: Model) -> State:
     plain = refit(state.problem, faults, state.repeated) if faults else state.baseline
     gained = (plain.squares - state.repeated.squares) / state.floor.count
     beaten = before**2
-    if (
-        ConditionChange.id not in state.repeated.names
-    ):  # else what was fitted has the later records' own zeros
-        # a model that has the heat already predicts a record that begins warm worse than any other
+    # What was fitted in several conditions has a zero for each, which no model has. Else it counts: a model
+    # that has the heat already predicts a record that begins warm worse than any other.
+    if ConditionChange.id not in state.repeated.names:
         static = plain.squares / state.floor.count + _within_averages(state.repeated)
         beaten = min(beaten, static * state.scale.span**2)
     if beaten - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
