@@ -386,6 +386,26 @@ def unscored(axes: Axes, waveform: Waveform, name: str = "not scored") -> None:
         )
 
 
+def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was than at calibration, as the duty tells, arrays (w,) in s and K."""
+    trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
+    _finish_temperature(axes, "time [s]", 0.4)  # a low panel, of which a legend is a large part
+
+
+def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was before each repeat (r,), K."""
+    axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
+    _finish_temperature(axes, "repeat", 0.16)
+    axes.margins(x=0.04)  # a point is whole at either end
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _finish_temperature(axes: Axes, over: str, share: float) -> None:
+    axes.axhline(0.0, **GUIDE)
+    axes.set(ylabel="coil, against\ncalibration [K]", xlabel=over)
+    headroom(axes, share)
+
+
 def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: dict[str, Any]) -> None:
     """Draw every repeat of one measurement, thin, in one colour; only the first is named, if there is one."""
     thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}

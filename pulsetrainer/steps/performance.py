@@ -111,7 +111,7 @@ class Performance:
         self._loss = 0.0 if thermometer is None else thermometer.extra
         self._warmth: list[tuple[float, float]] = []  # s and K, of each window
         self._pulses = tuple(pulse.name for pulse in pulses)
-        self._ledger = Ledger(self._pulses)
+        self._ledger = Ledger()
         self._reach = reach
         self._conductor = Conductor(
             extended_of(model), pulses, reach, rhythm, decide, self._ledger.give,
