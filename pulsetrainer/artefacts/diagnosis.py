@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
-from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.data import Data, FloatArray, percent
 from pulsetrainer.artefacts.model import Model, Parameter
 from pulsetrainer.artefacts.shown import Shown
 
@@ -86,15 +86,11 @@ class Diagnosis(Shown):
     verdict: str  # a cause's id, "none", "inconclusive", "unknown" or "unlisted"
     quick: bool  # screened only: figures are those of linearised scores
     rms: Annotated[float, Data("@output_unit", "rms error of the model as it was given")]
-    rms_percent: Annotated[float, Data("percent", "rms error of the model as it was given, of the span")]
-    noise_percent: Annotated[float, Data("percent", "white noise of single samples, rms, of the span")]
-    static_percent: Annotated[
-        float, Data("percent", "rms residual of averages, weights refitted, of the span")
-    ]
-    extended_percent: Annotated[float, Data("percent", "rms residual of averages, extended, of the span")]
-    floor_percent: Annotated[
-        float, Data("percent", "rms residual of averages when nothing is wrong, of the span")
-    ]
+    rms_percent: Annotated[float, percent("rms error of the model as it was given, of the span")]
+    noise_percent: Annotated[float, percent("white noise of single samples, rms, of the span")]
+    static_percent: Annotated[float, percent("rms residual of averages, weights refitted, of the span")]
+    extended_percent: Annotated[float, percent("rms residual of averages, extended, of the span")]
+    floor_percent: Annotated[float, percent("rms residual of averages when nothing is wrong, of the span")]
     causes: tuple[Cause, ...]
     evidence: tuple[str, ...]
     next_experiment: str
@@ -120,7 +116,7 @@ class Diagnosis(Shown):
     records: tuple[Recorded, ...] = ()
     correctable: tuple[str, ...] = ()  # faults of the measurement that were found, and can be taken out
     extended_rms_percent: Annotated[
-        float, Data("percent", "rms error of the extended model over single samples, of the span")
+        float, percent("rms error of the extended model over single samples, of the span")
     ] = float("nan")  # NaN where nothing was extended
     polarity: int = 1  # of the model
     as_measured: bool = False  # signs of parameters are those of the output; False: of output times polarity
