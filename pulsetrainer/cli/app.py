@@ -20,7 +20,6 @@ from pulsetrainer.version import __version__
 app = typer.Typer(
     name="pulsetrainer",
     cls=Program,
-    help="Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
@@ -59,10 +58,7 @@ def root(
     debug: Annotated[bool, Option("--debug", help="Show the whole traceback of an error.")] = False,
     verbose: Annotated[bool, Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
-    """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.
-
-    Begin, without a device: pulsetrainer capture identification -o run.h5
-    """
+    """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
     if context.resilient_parsing or {"-h", "--help"} & set(sys.argv):
         return  # help and completion need no settings, and a bad file must not hide them
     file = settings.find(settings_file, os.environ)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import DataError
 
@@ -113,7 +114,7 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
             )
     if len(answers) < questions:
         raise DataError(
-            f"{path} has {len(answers)} answer{'s' * (len(answers) != 1)} to {questions} questions",
+            f"{path} has {counted(len(answers), 'answer')} to {questions} questions",
             hint="write one pulse name on each line, as many as questions",
         )
     return [said if said in choices else written[said.casefold()] for _, said in answers]

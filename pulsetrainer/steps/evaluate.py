@@ -20,7 +20,7 @@ from pulsetrainer.artefacts import (
     Session,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import quantity_in_words, same_units, units_of, with_unit
+from pulsetrainer.artefacts.units import counted, quantity_in_words, same_units, units_of, with_unit
 from pulsetrainer.core import metrics, wild
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -197,7 +197,7 @@ def _wild_words(name: str, run: Run) -> list[str]:
     for part, tamed in zip(parts, wild.tame([(one.input, one.output) for one in parts]), strict=True):
         found = (tamed.wild_input | tamed.wild_output) & part.counts
         count += int(np.count_nonzero(wild.by_chance(found, part.input, reach)))
-    looks = "1 sample looks" if count == 1 else f"{count} samples look"
+    looks = counted(count, "sample", "looks", "look")
     return [f"{looks} wild in {name}, and count in its errors"] if count else []
 
 
