@@ -62,18 +62,6 @@ def _finding(name: str, found: str, *, warning: str | None = None, problem: str 
     return Finding(name, state, found, problem or warning or "")
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """All findings, in the order in which they were looked at."""
-
-    findings: tuple[Finding, ...]
-
-    @property
-    def problems(self) -> int:
-        """Findings that stand in the way."""
-        return sum(one.state == "problem" for one in self.findings)
-
-
 def examine(
     port: str | None = None,
     *,
@@ -82,7 +70,7 @@ def examine(
     settings: str = "",
     tuned: Path | None = None,
     progress: Callable[[float], None] = lambda _share: None,
-) -> Result:
+) -> list[Finding]:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
 
     ``limits`` hold meanwhile; ``settings`` says in words which are in force, ``tuned`` is the file with the
@@ -101,7 +89,7 @@ def examine(
     for number, look in enumerate(looks):
         found += look()
         progress((number + 1) / len(looks))
-    return Result(tuple(found))
+    return found
 
 
 # --- this computer ------------------------------------------------------------------------------------
