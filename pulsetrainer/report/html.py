@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import attrgetter
@@ -122,8 +122,14 @@ def page(template: str, *, provenance_json: str, history: Sequence[str] = (), **
     return rendered(provenance=provenance, version=version, history=history, **content)
 
 
-def render_evaluation(evaluation: Evaluation, **header: Any) -> str:
-    """Return the report of an evaluation beside the published device; ``header`` as in ``page``."""
+def render_evaluation(
+    evaluation: Evaluation, *, published: Mapping[str, Mapping[str, float]] = PUBLISHED, **header: Any
+) -> str:
+    """Return the report of an evaluation; ``header`` as in ``page``.
+
+    Beside its figures stand those of a ``published`` device by waveform: ``mean_error_reduction_percent``,
+    ``scaled.max_abs_error_percent`` and so on.
+    """
     evaluation = evaluation.told_apart()
     played = evaluation.waveforms
     # whose model the evaluation holds: that of the last
@@ -142,7 +148,7 @@ def render_evaluation(evaluation: Evaluation, **header: Any) -> str:
             key=lambda part: pulses.index(part[1].name),  # those of a pulse together, as in the table
         ),
         inversions=panels.inversions(played),
-        published=PUBLISHED,
+        published=published,
         model=evaluation.model,
         model_title=f"Model{last}",
         predicted=evaluation.models,

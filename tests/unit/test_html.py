@@ -15,7 +15,6 @@ import report_examples as examples
 import store_examples
 
 from pulsetrainer.artefacts import Evaluation, Parameter
-from pulsetrainer.report import html
 from pulsetrainer.report.diagnosis_html import headline, render_diagnosis
 from pulsetrainer.report.html import offset, render_evaluation
 
@@ -139,7 +138,7 @@ def test_numbers_are_those_of_the_evaluation(page):
                 assert float(printed.replace("−", "-")) == pytest.approx(value, abs=0.051), metric
 
 
-def test_published_figures_stand_beside(page, monkeypatch):
+def test_published_figures_stand_beside(page):
     """In the overview, marked as published, and never among the evaluation's own numbers."""
     beside = page.numbers("data-published")
     assert {name: values[0][0] for name, values in beside.items()} == {
@@ -150,8 +149,7 @@ def test_published_figures_stand_beside(page, monkeypatch):
     }
     rows = [text for a, text in page.of("tr") if a.get("class") == "published"]
     assert len(rows) == 2
-    monkeypatch.setattr(html, "PUBLISHED", {})
-    without = render(Evaluation(waveforms=EVALUATION.waveforms[:1]))
+    without = render(Evaluation(waveforms=EVALUATION.waveforms[:1]), published={})
     assert "published" not in without.partition("</style>")[2]
 
 
