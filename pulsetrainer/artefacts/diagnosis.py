@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import Annotated, ClassVar, NamedTuple
 
 from pulsetrainer.artefacts.data import Data, FloatArray, percent
@@ -23,7 +24,7 @@ class Cause:
     confounded_with: tuple[str, ...] = ()
     text: str = ""  # in words
     doubts: tuple[str, ...] = ()  # what speaks against a cause that was found, in words
-    detectable_from_percent: float = float("nan")  # smallest effect that would have shown, rms, of the span
+    detectable_from_percent: float = nan  # smallest effect that would have shown, rms, of the span
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +107,7 @@ class Diagnosis(Shown):
     output_unit: str = "N"
     input_quantity: str = ""  # of the model; empty in files of 0.1
     output_quantity: str = ""
-    held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
+    held_out_gain_percent: float = nan  # of all causes together; NaN where it was not measured
     lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records
     whole: bool = True  # False while what is left is more than noise
@@ -117,12 +118,10 @@ class Diagnosis(Shown):
     correctable: tuple[str, ...] = ()  # faults of the measurement that were found, and can be taken out
     extended_rms_percent: Annotated[
         float, percent("rms error of the extended model over single samples, of the span")
-    ] = float("nan")  # NaN where nothing was extended
+    ] = nan  # NaN where nothing was extended
     polarity: int = 1  # of the model
     as_measured: bool = False  # signs of parameters are those of the output; False: of output times polarity
-    empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
-        "nan"
-    )
+    empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = nan
     in_model: tuple[str, ...] = ()  # causes found that the model as given contains already
 
     @property
