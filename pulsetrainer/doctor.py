@@ -28,10 +28,11 @@ from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Trace
+from pulsetrainer.device.wording import UNKNOWN_REMEDY
 from pulsetrainer.diagnosis import gates, wording
 from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
-from pulsetrainer.steps.stopped import UNKNOWN_REMEDY, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 from pulsetrainer.version import __version__
 
 State = Literal["ok", "warning", "problem"]

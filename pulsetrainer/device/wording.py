@@ -34,6 +34,8 @@ _REMEDY: dict[int, str] = {
     **dict.fromkeys(FORCE_READING, FORCE_REMEDY),
 }
 
+UNKNOWN_REMEDY = "remove the cause; the next command clears the fault"
+FLASH = "flash the firmware that came with this program (make -C firmware)"
 NOT_OFF_REMEDY = "pull the supply's plug, then have the device's output transistor and current sensor checked"
 _KINDS: dict[type[IntEnum], str] = {
     codes.Fault: "fault",
