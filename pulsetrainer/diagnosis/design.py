@@ -31,7 +31,7 @@ from pulsetrainer.core.operator import Preisach, follow, rows
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
-from pulsetrainer.diagnosis.raw import hums
+from pulsetrainer.diagnosis.raw import as_fast_as_its_hum, hums
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
@@ -173,14 +173,21 @@ class Bins:
         return total
 
 
+def _hums_within(record: Record, per_bin: int) -> bool:
+    """Whether averages of so many samples would hide a hum that is larger than the noise."""
+    fewer = as_fast_as_its_hum(record, per_bin, 1.0) < per_bin
+    return fewer or hums(record.output, record.sample_weight)
+
+
 def bins_of(records: Sequence[Record]) -> Bins:
     """Bins over the samples with weight; DataError where hardly any sample has weight.
 
     A hum has the finest: slow records have averages of several of its periods, in which it would be noise.
     """
     duration = sum(r.input.size * r.step for r in records)
-    usual = 0.0 if any(hums(r.output, r.sample_weight) for r in records) else LIMITS.bin_s
-    width = max(min(usual, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
+    width, finest = min(LIMITS.bin_s, duration / LIMITS.enough_rows), duration / LIMITS.most_rows
+    if width <= finest or any(_hums_within(r, max(1, round(width / r.step))) for r in records):
+        width = finest
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.step))

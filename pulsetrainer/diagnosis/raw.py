@@ -139,6 +139,26 @@ def hums(y: FloatArray, weight: FloatArray) -> bool:
     return _share_of_a_line(_third_differences(y, weight)) > LIMITS.line_share
 
 
+def as_fast_as_its_hum(record: Record, per: int, least: float) -> int:
+    """Return how many samples may be averaged, ``per`` at most: a hum must not be seen at another frequency.
+
+    It is the highest line of the output's spectrum where averages would fold it, if it stands out and its
+    amplitude is ``least`` times the noise.
+    """
+    y = record.output - np.median(record.output)
+    window = scipy.signal.windows.hann(y.size)
+    amplitude = 2.0 * np.abs(scipy.fft.rfft(y * window)) / float(window.sum())
+    first = int(y.size * LIMITS.folded / per)
+    if amplitude.size - first < LIMITS.line_samples:
+        return per
+    k = first + int(np.argmax(amplitude[first:]))
+    around = float(np.median(amplitude[max(k - LIMITS.line_around, first) : k + LIMITS.line_around]))
+    noise = noise_of(record.output, record.sample_weight)
+    if amplitude[k] < max(LIMITS.line_stands * around, least * noise):
+        return per
+    return max(1, min(per, int(y.size * LIMITS.folded / k)))
+
+
 def _share_of_a_line(third: FloatArray) -> float:
     """Share of the squares of differences (k,) that one line of their spectrum has; 0 of too few."""
     if third.size < LIMITS.line_samples:

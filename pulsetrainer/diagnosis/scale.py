@@ -17,13 +17,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.finding import Estimate
-from pulsetrainer.diagnosis.raw import noise_of
+from pulsetrainer.diagnosis.raw import as_fast_as_its_hum
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 # Powers of input, output and time in every unit that a cause speaks of
@@ -152,7 +151,7 @@ def _slower(record: Record, step: float) -> Record:
     wanted = min(1.0 / LIMITS.fastest_Hz, record.input.size * step / LIMITS.most_samples)
     per = max(1, round(wanted / step))
     if per > 1:
-        per = _as_fast_as_its_hum(record, per)
+        per = as_fast_as_its_hum(record, per, LIMITS.relevant_noise / np.sqrt(per))
     if per == 1:
         return record
     cut = record.input.size // per * per
@@ -168,22 +167,3 @@ def _slower(record: Record, step: float) -> Record:
         reference=None if record.reference is None else averaged(record.reference),
         averaged=per,
     )
-
-
-def _as_fast_as_its_hum(record: Record, per: int) -> int:
-    """Return how many samples may be averaged, ``per`` at most: a hum must not be seen at another frequency.
-
-    It is the highest line of the output's spectrum where averages would fold it, if it stands out.
-    """
-    y = record.output - np.median(record.output)
-    window = scipy.signal.windows.hann(y.size)
-    amplitude = 2.0 * np.abs(scipy.fft.rfft(y * window)) / float(window.sum())
-    first = int(y.size * LIMITS.folded / per)
-    if amplitude.size - first < LIMITS.line_samples:
-        return per
-    k = first + int(np.argmax(amplitude[first:]))
-    around = float(np.median(amplitude[max(k - LIMITS.line_around, first) : k + LIMITS.line_around]))
-    noise = noise_of(record.output, record.sample_weight) / np.sqrt(per)
-    if amplitude[k] < max(LIMITS.line_stands * around, LIMITS.relevant_noise * noise):
-        return per
-    return max(1, min(per, int(y.size * LIMITS.folded / k)))

@@ -180,7 +180,7 @@ def _scores(
         p_values[name] = min(p_values.get(name, 1.0), float(known[k]))
         if name not in best or gains[k] > gains[best[name]]:
             best[name] = k
-    frames, left = fitted.problem.frames, _at_full_rate(fitted.problem, fitted)
+    frames, left = fitted.problem.frames, at_full_rate(fitted.problem, fitted)
     scores = [
         Score(
             block.cause,
@@ -257,7 +257,7 @@ def _less(
     return free
 
 
-def _at_full_rate(problem: Problem, fitted: Fitted) -> list[FloatArray]:
+def at_full_rate(problem: Problem, fitted: Fitted) -> list[FloatArray]:
     """Residual (n,) of every record at its own rate, zero where samples have no weight."""
     wrong = problem.measured - fitted.simulated
     start = problem.bins.free @ (problem.bins.free.T @ wrong)
@@ -286,7 +286,7 @@ def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
     project = fitted.projector
     own = project(fitted.slopes)
     known = scipy.linalg.orth(own) if own.shape[1] else own
-    parts = _at_full_rate(problem, fitted)
+    parts = at_full_rate(problem, fitted)
     timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [
         (kind, values)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pulsetrainer.artefacts.model import Extension, Model
-from pulsetrainer.diagnosis import artefact, design, fitting, residual, velocity, wear, wording
+from pulsetrainer.diagnosis import artefact, design, fitting, lines, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
@@ -388,6 +388,7 @@ def test_the_accepted_one_is_refitted_and_the_floor_estimated_anew(monkeypatch, 
 @pytest.mark.parametrize(("name", "taken"), [("periodic", True), ("creep", False)])
 def test_a_hum_that_halves_do_not_predict_is_asked_of_whole_pieces(monkeypatch, name, taken):
     """Halves of equal cycles are their two branches; a line is the same at all times."""
+    _standing_out(monkeypatch, False)
     _refitting(monkeypatch, acceptance, squares={frozenset({name}): 399.0})
     held_out = HeldOut(-1.0)
     held_out.gain_told = lambda before, after, floor: 0.9
@@ -625,12 +626,23 @@ def test_where_only_noise_is_left_without_it_little_need_be_predicted(monkeypatc
     assert elimination.stage(replace(state, held_out=HeldOut(0.32))).current.names == kept
 
 
+def _standing_out(monkeypatch, stands_out):
+    monkeypatch.setattr(lines, "at_full_rate", lambda *_: [])
+    monkeypatch.setattr(type(CAUSE["periodic"]), "stands_out", lambda *_: stands_out)
+
+
 @pytest.mark.parametrize(
-    ("without", "in_step", "kept"),
-    [(801.0, False, ("periodic",)), (799.0, False, ()), (801.0, True, ())],
+    ("without", "stands_out", "in_step", "kept"),
+    [
+        (801.0, False, False, ("periodic",)),
+        (799.0, True, False, ("periodic",)),
+        (799.0, False, False, ()),
+        (801.0, True, True, ()),
+    ],
 )
-def test_a_strong_line_need_not_predict_much(monkeypatch, without, in_step, kept):
-    """More than half of what is left without it, and not in step with the input."""
+def test_a_strong_line_need_not_predict_much(monkeypatch, without, stands_out, in_step, kept):
+    """More than half of what is left without it, or far above the lines near it; not in step."""
+    _standing_out(monkeypatch, stands_out)
     _refitting(monkeypatch, fitting, squares={frozenset({"step"}): without, frozenset({"periodic"}): 900.0})
     monkeypatch.setattr(screened, "stage", lambda state: state)
     monkeypatch.setattr(type(CAUSE["periodic"]), "in_step", lambda *_: in_step)
@@ -1154,6 +1166,7 @@ def test_a_hum_in_step_with_the_loops_that_the_weights_can_follow_is_in_doubt(
     monkeypatch, frequency, fall, doubted
 ):
     """Of squares of 50 that it adds less than six tenths are missed: a memristor was called a hum."""
+    _standing_out(monkeypatch, False)
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
     time = 0.01 * np.arange(1000)
     hum = Term(CAUSE["periodic"], (1.0, 0.0, frequency))

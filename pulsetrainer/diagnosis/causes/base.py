@@ -232,6 +232,10 @@ class Cause:
         """Return whether so small a cause differs from what the moments of sampling do."""
         return True
 
+    def stands_out(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> bool:
+        """Return whether its line is far above all others near it in what a model without it leaves."""
+        return False
+
     def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether a fault goes in step with the input, as only what the device itself does should."""
         return False

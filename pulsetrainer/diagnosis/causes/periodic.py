@@ -11,7 +11,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
-from pulsetrainer.diagnosis.thresholds import TINY
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.floor import Floor
@@ -85,6 +85,15 @@ class Periodic(Cause):
         """Return whether it is a hum of the noise's size."""
         rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
         return bool(rms <= min(_FAINT_NOISE * floor.noise, _FAINT))
+
+    def stands_out(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> bool:
+        """Return whether its line is far above all others near it in what a model without it leaves."""
+        one, frame = max(zip(residual, frames, strict=True), key=lambda pair: pair[0].size)
+        amplitude = np.abs(scipy.fft.rfft(one * np.hanning(one.size)))
+        k = round(values[-1] * one.size * frame.dt_s)
+        near = amplitude[max(k - _LINES, 0) : k + _LINES + 1]
+        line = amplitude[max(k - _WIDE, 0) : k + _WIDE + 1]
+        return bool(line.size and line.max() > LIMITS.line_stands * np.median(near))
 
     def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether the input has one frequency, of which this is a multiple as far as can be told."""

@@ -6,7 +6,8 @@ candidates in order. The first one is accepted that meets these conditions:
 - its refit lowers the sum of squares by a relevant amount; a refit that falls just short is continued until
   it converges;
 - it lowers the error on blocks that were left out of the fit by at least a twentieth of what can be lowered
-  there; if too few blocks are left to test this, the fit alone decides;
+  there; if too few blocks are left to test this, the fit alone decides, and so it does for a line of the
+  spectrum that stands ten times above the lines near it;
 - the record can distinguish it at all;
 - if it has several parameters, they do not all run into their bounds: it would no longer be the cause that it
   is named after.
@@ -24,6 +25,7 @@ import numpy as np
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.moments import profile
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
@@ -41,7 +43,9 @@ def stage(state: State) -> State:
         # halves of equal cycles are their two branches, which show nothing of a hum (decision 124)
         gain_of = state.held_out.gain_told if score.cause.line else state.held_out.gain
         gain = gain_of(state.current, trial, state.floor)
-        if np.isfinite(gain) and gain < LIMITS.held_out_least:
+        (new,) = (term for term in trial.terms if term.cause.id == score.cause.id)
+        line = is_a_line(state, new, trial, state.current)
+        if np.isfinite(gain) and gain < LIMITS.held_out_least and not line:
             continue
         accepted = settled(state.problem, trial)
         frames = state.problem.frames

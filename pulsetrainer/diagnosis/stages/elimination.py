@@ -12,9 +12,11 @@ dropped for these only:
   harm beside them.
 - The cause takes away less than a third of what can be lowered on blocks that were left out. This counts only
   if more than noise is left with the cause or without it: any cause fits a device that is not a Preisach
-  operator. A line of the spectrum that is most of what is left without it is not dropped for this reason. No
-  error of a model looks like such a line, however badly blocks that were left out are predicted for other
-  reasons.
+  operator.
+
+A line of the spectrum is not dropped for these two reasons if it is most of what is left without it, or
+stands ten times above the lines near it. No error of a model looks like such a line, however badly blocks
+that were left out are predicted for other reasons.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ import numpy as np
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.fast_causes import beside_fast_creep
 from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -47,7 +50,9 @@ def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
         spare = None if single else _spare(state, current, without)
         # a learned curve can do what a listed cause does: that is then no better, and may yet be true
         if spare is None and (single or Unlisted.id not in current.names):
-            spare = _harmful(state, current, without) or _of_little_use(state, current, without)
+            pairs = zip(current.terms, without, strict=True)
+            asked = [fewer for term, fewer in pairs if not is_a_line(state, term, current, fewer)]
+            spare = _harmful(state, current, asked) or _of_little_use(state, current, asked)
         if spare is None:
             return current, {t.cause.id: one for t, one in zip(current.terms, without, strict=True)}
         current = spare
@@ -73,11 +78,7 @@ def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> 
     If only noise is left without a cause too, the blocks left out hold mostly noise, which nothing
     predicts: such a cause is not considered.
     """
-    without = [
-        fewer
-        for fewer in without
-        if not (state.is_whole(current) and state.is_whole(fewer)) and not _is_a_line(state, current, fewer)
-    ]
+    without = [fewer for fewer in without if not (state.is_whole(current) and state.is_whole(fewer))]
     if not without:
         return None
     gains = [state.held_out.gain_told(fewer, current, state.floor) for fewer in without]
@@ -85,20 +86,13 @@ def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> 
     return without[least] if gains[least] < LIMITS.held_out_kept else None
 
 
-def _is_a_line(state: State, current: Fitted, fewer: Fitted) -> bool:
-    """Whether the cause that ``fewer`` lacks is a line of the spectrum, and most of what ``fewer`` leaves."""
-    (term,) = (term for term in current.terms if term.cause.id not in fewer.names)
-    strong = fewer.squares - current.squares > LIMITS.half * fewer.squares
-    return term.cause.line and strong and not term.cause.in_step(term.values, state.problem.frames)
-
-
 def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
     """The model with one cause less that predicts best, if better than the full one; else None.
 
     Both alternating blocks and whole pieces of the time must show it.
     """
-    best = min(without, key=state.held_out.error)
-    if not state.held_out.gain(best, current, state.floor) < 0:  # NaN: it cannot be told
+    best = min(without, key=state.held_out.error, default=None)
+    if best is None or not state.held_out.gain(best, current, state.floor) < 0:  # NaN: it cannot be told
         return None
     fewer, more = (np.sum(state.held_out.pieces(one, LIMITS.pieces)) for one in (best, current))
     return best if fewer <= more else None

@@ -3,8 +3,8 @@
 The weights have absorbed most of any effect, so a cause that is fitted to what they leave comes out too
 small. The three best candidates are therefore fitted jointly: the parameters of all causes and all weights at
 once. If the refit of a candidate lowers nothing (a lag, say, where the output leads), the next one takes its
-turn. If one of them is a lag, the other lags are tried too, starting from the same lateness: linearised from
-far away, lags hardly differ.
+turn. A hum, which nothing else resembles, is tried in any case. If one of them is a lag, the other lags are
+tried too, starting from the same lateness: linearised from far away, lags hardly differ.
 
 A candidate must be significant, and its linearised score at least half of what is relevant, since the score
 shows less than a refit does. A *family* is a group of causes that look alike, such as the lags. No candidate
@@ -32,9 +32,9 @@ def stage(state: State) -> State:
     trials: list[tuple[Fitted, Score]] = []
     for score in state.scores.scores:
         lower = [trial for trial, _ in trials if trial.squares < state.current.squares]
-        if len(lower) == LIMITS.tried or not promising(state, score):
+        if not promising(state, score):
             break
-        if score.cause.family not in state.families:
+        if (len(lower) < LIMITS.tried or score.cause.line) and score.cause.family not in state.families:
             trials.append((_of_best_kind(state, score), score))
     trials += _as_late(state, trials)
     trials.sort(key=lambda pair: pair[0].squares)

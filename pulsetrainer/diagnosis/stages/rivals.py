@@ -45,6 +45,7 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -72,7 +73,8 @@ def _finding(state: State, term: Term) -> Finding:
     without = state.without[name]
     gain = PERCENT * state.held_out.gain_told(without, state.current, state.floor)
     doubts = tuple(_doubts(state, term, gain, without.squares - state.current.squares))
-    tied = () if name in state.by_contrast else rivals(state, term)
+    alone = name in state.by_contrast or is_a_line(state, term, state.current, without)
+    tied = () if alone else rivals(state, term)
     if MAY_BE_WEAR in doubts and Accommodation.id not in (*tied, *state.current.names):
         tied = (*tied, Accommodation.id)
     return Finding(
