@@ -15,13 +15,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pulsetrainer.core import large, nnls
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import LEAST_SIGNED, Choice, choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
@@ -322,7 +321,7 @@ def _alternate(
     """
     offset = equations.output_sum / equations.weight_sum
     spread = np.sqrt(max(equations.output_square / equations.weight_sum - offset**2, 0.0))
-    passive: NDArray[np.bool_] | None = None
+    passive: BoolArray | None = None
     before: tuple[float, float] | None = None
     for iteration in range(1, limit + 1):
         found = nnls.solve(gram, equations.moment - offset * equations.row_sum, passive=passive)

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, finite_vector
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 # A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
@@ -39,7 +38,7 @@ class NonNegative(NamedTuple):
     """The minimiser, where it is positive, and how many systems were solved."""
 
     x: FloatArray  # (q,)
-    passive: NDArray[np.bool_]  # (q,) True where x may be positive
+    passive: BoolArray  # (q,) True where x may be positive
     iterations: int
 
 
@@ -47,7 +46,7 @@ def solve(
     gram: FloatArray,
     rhs: FloatArray,
     *,
-    passive: NDArray[np.bool_] | None = None,
+    passive: BoolArray | None = None,
     max_iterations: int = _SYSTEMS,
 ) -> NonNegative:
     """Return the non-negative minimiser of x' G x / 2 - f' x for G = ``gram`` (q, q) and f = ``rhs`` (q,).
@@ -86,7 +85,7 @@ class Gram:
         self._factored: tuple[IntArray, Factor] | None = None
 
     def solve(
-        self, rhs: FloatArray, *, passive: NDArray[np.bool_] | None = None, max_iterations: int = _SYSTEMS
+        self, rhs: FloatArray, *, passive: BoolArray | None = None, max_iterations: int = _SYSTEMS
     ) -> NonNegative:
         """Return the non-negative minimiser: see ``solve``."""
         rhs = finite_vector("rhs", rhs)
@@ -122,7 +121,7 @@ class Gram:
         x[self.usable], _ = scipy.optimize.nnls(root[:, None] * vector, b, maxiter=_ACTIVE_SETS * rhs.size)
         return NonNegative(x, x > 0, used)
 
-    def minimise(self, rhs: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
+    def minimise(self, rhs: FloatArray, free: BoolArray) -> FloatArray:
         """Minimiser (q,) over the free variables (q,), of either sign, the others zero."""
         x = np.zeros(rhs.size)
         index = np.flatnonzero(free)
@@ -153,7 +152,7 @@ def factor_of(matrix: FloatArray, ridge: FloatArray) -> Factor:
             ridge = 10.0 * ridge
 
 
-def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iterations: int) -> NonNegative:
+def _exchange(problem: _Problem, passive: BoolArray | None, max_iterations: int) -> NonNegative:
     """Exchange all variables on the wrong side at once, until there are none."""
     q = problem.rhs.size
     free = np.zeros(q, dtype=bool) if passive is None else passive & problem.usable
@@ -180,7 +179,7 @@ class _Problem:
     def __init__(self, gram: Gram, rhs: FloatArray) -> None:
         self.gram, self.rhs, self.usable = gram, rhs, gram.usable
 
-    def minimise_over(self, free: NDArray[np.bool_]) -> FloatArray:
+    def minimise_over(self, free: BoolArray) -> FloatArray:
         return self.gram.minimise(self.rhs, free)
 
     def gradient(self, x: FloatArray) -> FloatArray:
@@ -192,10 +191,10 @@ class _Problem:
         change = float(step @ (self.gradient(here) + 0.5 * (self.gram.matrix @ step)))
         return change < -_ROUNDING * float(np.abs(self.rhs) @ here)
 
-    def negative(self, x: FloatArray) -> NDArray[np.bool_]:
+    def negative(self, x: FloatArray) -> BoolArray:
         return x < -_ROUNDING * np.abs(x).max(initial=0.0)
 
-    def descends(self, x: FloatArray) -> NDArray[np.bool_]:
+    def descends(self, x: FloatArray) -> BoolArray:
         """Where the gradient is negative by more than the rounding of the sums it came from."""
         return self.gradient(x) < -_ROUNDING * (self.gram.size @ np.abs(x) + np.abs(self.rhs))
 

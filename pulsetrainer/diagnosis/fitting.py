@@ -16,11 +16,10 @@ from functools import cached_property, partial
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import Frame, Quantity
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, hysteresis, in_order, shown_output
@@ -35,7 +34,7 @@ class Fitted:
     terms: tuple[Term, ...]
     simulator: Simulator
     design: Design
-    passive: NDArray[np.bool_]
+    passive: BoolArray
     simulated: FloatArray  # (count,) as the causes and the operator give it
     residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float

@@ -12,10 +12,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
 from pulsetrainer.core.nnls import SMALLEST_DIAGONAL, factor_of
-from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.fitting import Fitted
@@ -143,7 +142,7 @@ class _Rows:
         self._beside = np.hstack((bins.settled(fitted.slopes), bins.free, fitted.residual[:, None]))
         self._starts = slice(fitted.slopes.shape[1], self._beside.shape[1] - 1)
 
-    def products(self, own: NDArray[np.bool_]) -> FloatArray:
+    def products(self, own: BoolArray) -> FloatArray:
         """R'R (k + m, k + m) over the rows ``own`` (count,)."""
         beside = self._beside[own]
         cells, across = self._design.products(own, self._cells, beside)

@@ -22,9 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.design import Bins
 from pulsetrainer.diagnosis.thresholds import CHI_SQUARE_MEDIAN, LIMITS, TINY
 
@@ -107,7 +106,7 @@ def _scale(left: FloatArray, bins: Bins, level: FloatArray) -> FloatArray:
 
 
 def _by_level(
-    level: FloatArray, counts: NDArray[np.bool_], size: Callable[[NDArray[np.bool_]], float]
+    level: FloatArray, counts: BoolArray, size: Callable[[BoolArray], float]
 ) -> tuple[list[float], list[float]]:
     """Middles of groups of levels, and the size of what counts there; groups of few rows are left out."""
     low, high = float(level.min()), float(level.max())
@@ -210,7 +209,7 @@ def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatA
     return bands[:-1], bands[-1]
 
 
-def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray, trimmed: float) -> float:
+def _square(band: FloatArray, quiet: BoolArray, level: FloatArray, trimmed: float) -> float:
     """Mean square of a band by its medians where it is quiet, at each level of the output."""
     middles, squares = _by_level(level, quiet, lambda own: _trimmed(band[own], trimmed))
     if not squares:

@@ -7,15 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE, TINY
 from pulsetrainer.errors import DataError
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from typing import ClassVar
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
-from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _PARTS = 5  # of a rest, of which means are taken: shorter rests show no course

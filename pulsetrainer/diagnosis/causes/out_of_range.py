@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
-from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw
+from pulsetrainer.diagnosis.raw import Firing, Raw
 
 _SLACK = 0.01  # of the range: noise may carry an input this far beyond the end
 _LEFT_OVER = 0.25  # of the samples with weight: a mask must leave at least this share

@@ -7,9 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.wild import isolated
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
@@ -101,7 +100,7 @@ def _comes_back(u: FloatArray) -> FloatArray:
     return np.asarray(way - swing)
 
 
-def _hurries(u: FloatArray) -> NDArray[np.bool_]:
+def _hurries(u: FloatArray) -> BoolArray:
     """Whether an input (n,) moves far faster beside a sample than near it: a short ramp between rests.
 
     A force that follows the speed comes and goes with it.
