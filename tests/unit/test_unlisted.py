@@ -19,12 +19,11 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import dependence, learned
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.base import Frame, Past
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.repeats import repeats
 from pulsetrainer.diagnosis.thresholds import LIMITS

@@ -83,12 +83,7 @@ class ConditionChange(Cause):
         return (*self.parameters, *more)
 
     def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
-        """Return all of them."""
         return parameters
-
-    def sign(self, name: str, polarity: int) -> int:
-        """Return that of the same parameter of the second record."""
-        return super().sign(name.partition(" ")[0], polarity)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         tried = np.diag(np.tile((_TRIED * frames[0].span, _TRIED), len(frames) - 1)).tolist()

@@ -77,10 +77,6 @@ class Periodic(Cause):
         strengths = size * np.eye(2 * frame.records)
         return [[(*row.tolist(), best) for row in strengths]]
 
-    def sign(self, name: str, polarity: int) -> int:
-        """Return by what a parameter is multiplied when the output is; of later records it has a number."""
-        return super().sign(name.partition(" ")[0], polarity)
-
     def is_background(self, sizes: Sequence[float], floor: Floor) -> bool:
         """Return whether it is a hum of the noise's size."""
         rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
