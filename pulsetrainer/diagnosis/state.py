@@ -246,6 +246,11 @@ class State:
         """Whether a fault of the measurement may be something that the device does."""
         return self.unexplained or any(library()[name].lasting for name in fault.confounded_with)
 
+    def in_its_units(self, known: Mapping[str, tuple[Estimate, ...]]) -> dict[str, tuple[Estimate, ...]]:
+        """Return estimates in the units of the records; of what equal loops show, those of the loops."""
+        both = {**known, **self.by_contrast}
+        return {name: tuple(self.scale.estimate(one) for one in rows) for name, rows in both.items()}
+
     def rms_of(self, share: float) -> float:
         """Rms of a share of what can be explained."""
         return float(np.sqrt(share * self.floor.reducible(self.baseline) / self.floor.count))

@@ -1810,6 +1810,12 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
     assert found.findings[0].parameters == (tuple(told) if at_rest else known)
     fewer = begin.stage(replace(state, estimates={"creep": known[:1]}))  # of another number of curves
     assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
+    # what equal loops show is told in the units of the record, as all else
+    loops = {"load-dependence": (Estimate("coefficient", 5.0, "{u}/{y}", 4.0, 6.0),)}
+    scale = Scale(reach=3.0, span=2.0)
+    both = begin.stage(replace(state, by_contrast=loops, scale=scale, estimates={}))
+    told = (Estimate("coefficient", 7.5, "{u}/{y}", 6.0, 9.0),)
+    assert both.repeated_estimates.get("load-dependence") == (told if at_rest else None)
 
 
 @pytest.mark.parametrize(

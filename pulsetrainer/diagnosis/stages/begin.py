@@ -36,9 +36,7 @@ def stage(state: State) -> State:
             kept = trial
     if kept is state.current:
         return replace(state, repeated_estimates=state.estimates)
-    known = estimates_of(kept, state.scores, state.held_out, state.floor)
-    told = {name: tuple(state.scale.estimate(one) for one in rows) for name, rows in known.items()}
-    told = {**told, **state.by_contrast}
+    told = state.in_its_units(estimates_of(kept, state.scores, state.held_out, state.floor))
     findings = tuple(_told_by_both(one, told.get(one.cause.id, ())) for one in state.findings)
     told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
     return replace(state, repeated=kept, repeated_estimates=told, findings=findings)

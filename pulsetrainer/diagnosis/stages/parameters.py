@@ -21,10 +21,4 @@ from pulsetrainer.diagnosis.state import State
 def stage(state: State) -> State:
     """Return the state with 95 % intervals of all parameters."""
     known = estimates_of(state.current, state.scores, state.held_out, state.floor)
-    return replace(
-        state,
-        estimates={
-            name: tuple(state.scale.estimate(one) for one in rows)
-            for name, rows in {**known, **state.by_contrast}.items()
-        },
-    )
+    return replace(state, estimates=state.in_its_units(known))
