@@ -718,7 +718,7 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     best = SimpleNamespace(p_value=p_value, fall=gain, starts=((part, term.values),))
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
     monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: again)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: float(again))
     _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(left), held_out=HeldOut(float(again))))
     assert after.current.names == (("unlisted",) if learned else ())
@@ -751,7 +751,7 @@ def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypa
 
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: 1.0)
     _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
     assert [len(term.cause.parts) for term in after.current.terms] == [curves]
@@ -769,7 +769,7 @@ def test_whether_output_or_gain_depends_on_it_the_refit_tells(monkeypatch, of_ga
 
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: 1.0)
     _nothing_else_happens(monkeypatch)
     (term,) = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0))).current.terms
     assert [part.gain for part in term.cause.parts] == [not added]

@@ -19,8 +19,8 @@ import numpy as np
 
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.intervals import estimates_of
 from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.stages.parameters import estimates_of
 from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
