@@ -51,15 +51,8 @@ class Bank:
             for y, frame in zip(simulator.inner(fitted.terms), simulator.frames, strict=True)
         ]
         self.output = fitted.problem.bins.average(self.outputs)  # (count,)
-        own = fitted.projector(fitted.slopes)
-        self.known = scipy.linalg.orth(own) if own.shape[1] else own
+        self.project = fitted.beyond
         self.residual = self.project(fitted.residual[:, None])[:, 0]
-
-    def project(self, columns: FloatArray) -> FloatArray:
-        """Columns (count, k) less what weights and causes in the model can do."""
-        free = self.fitted.projector(columns)
-        free -= self.known @ (self.known.T @ free)
-        return free
 
     def state(self, kind: int, tau: float) -> FloatArray:
         """Averages (count,) of one state."""

@@ -10,6 +10,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
+from pulsetrainer.core.wild import repaired
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE, TINY
 from pulsetrainer.errors import DataError
@@ -51,9 +52,7 @@ class Raw:
         """The record with its wild samples filled in: they pile up at the converter's end."""
         if self.wild is None:
             return self.record
-        good = np.flatnonzero(~self.wild)
-        output = np.interp(np.arange(self.wild.size), good, self.record.output[good])
-        return replace(self.record, output=output)
+        return replace(self.record, output=repaired(self.record.output, self.wild))
 
 
 @dataclass(frozen=True)

@@ -250,7 +250,7 @@ def test_a_residual_at_the_full_rate_averages_to_the_one_that_was_fitted():
     y = np.where(counts, 3.0 * u + 0.1 * np.sin(np.arange(u.size) / 9.0), 99.0)
     problem = problem_for([Record(u, y, 1.0 * counts, dt_s=0.01)], 0.0, 1.5)
     fitted = weights_for(problem, (), None)
-    (left,) = screening._at_full_rate(problem, fitted)
+    (left,) = screening._at_full_rate(fitted)
     assert np.all(left[~counts] == 0.0)
     np.testing.assert_allclose(problem.bins.average([left]), fitted.residual, atol=1e-9)
 

@@ -2030,7 +2030,7 @@ def _given(
     fit = SimpleNamespace(warning=warning, output=np.asarray(fitted))
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
     played = SimpleNamespace(input=np.asarray(inputs), output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
-    judged = given_model.Judged([played], [RAMP - predicted], RAMP, predicted, speed, polarity)
+    judged = given_model.Judged([played], [predicted], speed, polarity, 0.0)
     monkeypatch.setattr(given_model, "judge", lambda state, given: judged)
     monkeypatch.setattr(given_model, "_drifted", lambda *_: None)  # test_diagnosis_given_drift
     monkeypatch.setattr(velocity, "compare", lambda *_: velocity.Comparison(1.0, direction, 10.0))
@@ -2200,7 +2200,8 @@ def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
             return [RAMP]
 
     current = SimpleNamespace(rms=0.01, terms=(_term("creep"),), simulator=Simulator())
-    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
+    inputs = np.asarray([0.0, 1.0, 0.0])
+    record = SimpleNamespace(input=inputs, output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     findings = (replace(_finding("creep", 20.0), doubts=doubts),)
@@ -2214,7 +2215,8 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     cause = Unlisted() if name == "unlisted" else CAUSE[name]
     simulator = SimpleNamespace(full=lambda terms: [RAMP], inner=lambda terms: [RAMP])
     current = SimpleNamespace(rms=0.01, terms=(SimpleNamespace(cause=cause),), simulator=simulator)
-    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
+    inputs = np.asarray([0.0, 1.0, 0.0])
+    record = SimpleNamespace(input=inputs, output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     found = (Finding(cause, found=True),)

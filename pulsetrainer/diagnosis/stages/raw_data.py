@@ -29,6 +29,7 @@ from pulsetrainer.core.memory import State
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.turns import at_their_tips
+from pulsetrainer.core.wild import repaired
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.coarse_input import as_it_moved
 from pulsetrainer.diagnosis.prediction import predict
@@ -95,9 +96,6 @@ def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
     for firing in firings:
         if firing.mask is not None:
             weight[firing.mask] = 0.0
-    output, bad = record.output, weight == 0
-    if bad.any() and not bad.all():
-        good = np.flatnonzero(~bad)
-        output = output.copy()
-        output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
+    bad = weight == 0
+    output = record.output if bad.all() else repaired(record.output, bad)
     return replace(record, sample_weight=weight, output=output)
