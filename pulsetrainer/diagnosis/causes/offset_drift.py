@@ -12,13 +12,13 @@ distinguish it from another zero, but the model as given can (`given_drift`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.thresholds import TINY
 
 _TRIED = 0.01  # of the span over the record
@@ -60,18 +60,14 @@ class OffsetDrift(Cause):
     )
     lasting = False
     corrects = True
-    texts: ClassVar[Mapping[str, str]] = {
-        "against given": (
-            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
-            "from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide "
-            "some of the drift"
-        ),
-        "against given, nothing left": (
-            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
-            "from that, the model leaves no more than noise. Weights refitted to these recordings hide some "
-            "of the drift"
-        ),
-    }
+    texts = sentences("""
+        against given: relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y};
+            apart from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings
+            hide some of the drift
+        against given, nothing left: relative to the model as given, the zero of the {output} moves by
+            {moved:+.2g}{in_y}; apart from that, the model leaves no more than noise. Weights refitted to
+            these recordings hide some of the drift
+    """)
 
     def __init__(self, count: int = _PLAIN) -> None:
         self._count = count
