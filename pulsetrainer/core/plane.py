@@ -188,8 +188,7 @@ class Plane:
             k = int(np.flatnonzero(bad)[0])
             wanted = "finite" if signed else "finite and not negative"
             raise ArgumentError(
-                f"weights must be {wanted}, got {array[k]:g} in cell {k}",
-                hint="identify the model again",
+                f"weights must be {wanted}, got {array[k]:g} in cell {k}", hint="identify the model again"
             )
         return array
 

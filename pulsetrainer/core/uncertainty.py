@@ -23,11 +23,12 @@ from numpy.typing import ArrayLike
 from pulsetrainer.core import nnls
 from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
-from pulsetrainer.core.identification import Identified, fits_dense, penalised
+from pulsetrainer.core.identification import Identified, fits_dense
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.record import Record, levelled
+from pulsetrainer.core.stiffness import penalised
 from pulsetrainer.errors import ArgumentError
 
 # More blocks cost memory and time, and do not change the intervals any more.
