@@ -31,6 +31,11 @@ class Term:
     cause: Cause
     values: Values
 
+    def at_bounds(self, frame: Frame) -> list[bool]:
+        """Tell for each parameter whether it lies at an end of what was searched."""
+        bounds = self.cause.quantities(frame)
+        return [value in (one.low, one.high) for value, one in zip(self.values, bounds, strict=True)]
+
 
 def in_order(terms: Sequence[Term]) -> tuple[Term, ...]:
     """Terms in the order of the chain."""
@@ -123,7 +128,6 @@ class Extended:
         lead: FloatArray,
         inverse: Callable[[FloatArray], inversion.Inverse] | None = None,
         band_Hz: float | None = None,
-        steps: int = LIMITS.inverse_rounds,
     ) -> Tracked:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
@@ -164,7 +168,7 @@ class Extended:
                 )
             elif tried.number > best.steps + LIMITS.inverse_patience:
                 break
-            if tried.number == steps:
+            if tried.number == LIMITS.inverse_rounds:
                 break
         assert best is not None
         return best if late == 0 else _in_time(best, static_inverse(target), target, respond)

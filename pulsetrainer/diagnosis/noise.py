@@ -11,6 +11,8 @@ noise. A sum c'n then has the variance
 with the record padded with as many zeros, so that its ends do not meet. How large the noise is, whatever a
 model still misses, is estimated by ``quiet_square``. It looks where the input rests or is slow, octave by
 octave, and leaves out the largest averages. Noise slower than these octaves is extrapolated from them.
+
+How far the sums of squares of two fits may differ although neither is better, ``doubt`` says.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.design import Bins
+from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.thresholds import CHI_SQUARE_MEDIAN, LIMITS, TINY
 
 _EXPONENTIAL_MEDIAN = float(np.log(2.0))  # of a line of a periodogram, of its mean
@@ -224,3 +227,30 @@ def _trimmed(values: FloatArray, share: float) -> float:
     edge = float(scipy.stats.norm.isf(0.5 * share))
     expected = 1.0 - 2.0 * edge * float(scipy.stats.norm.pdf(edge)) / (1.0 - share)
     return float(squares[:kept].mean()) / expected
+
+
+def doubt(fitted: Fitted, other: Fitted, noise: Noise | None) -> float:
+    """Difference of squares of two fits that tells nothing: of noise, and of what lies between samples."""
+    if noise is None:
+        return 0.0
+    apart = fitted.projector((other.simulated - fitted.simulated)[:, None])
+    return _by_chance(noise, apart) + _between_samples(fitted, apart[:, 0])
+
+
+def _by_chance(noise: Noise, apart: FloatArray) -> float:
+    """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
+
+    Of squares |e + d|^2 - |e|^2 with e noise and d (count, 1) the difference of the models, 2 d'e is chance.
+    """
+    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(noise.covariance(apart)[0, 0]))
+
+
+def _between_samples(fitted: Fitted, apart: FloatArray) -> float:
+    """Difference of squares of two models, ``apart`` (count,), that what happens between samples can make.
+
+    A turn of the input lies anywhere between two samples, and what is cut off there looks like a share of the
+    second difference of the output: the formulas of short lags differ by just that (decision 101).
+    """
+    bent = [np.diff(y, 2, prepend=y[:1], append=y[-1:]) for y in fitted.simulator.full(fitted.terms)]
+    cut = fitted.projector(fitted.problem.bins.average(bent)[:, None])[:, 0]
+    return 2.0 * LIMITS.cut_turns * abs(float(apart @ cut))

@@ -16,7 +16,7 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
 from pulsetrainer.diagnosis.evidence import sentences
-from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, runs_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
@@ -118,10 +118,8 @@ def _beside(at: BoolArray) -> FloatArray:
 
 def _stops_at_once(raw: Raw, y: FloatArray, at: BoolArray, step: float) -> bool:
     """Whether an output (n,) runs into its upper end in most of the strokes that leave it there."""
-    u, edges = raw.record.input, np.diff(at.astype(np.int8), prepend=0, append=0)
-    told = []
-    begins, ends = (np.flatnonzero(edges == way).tolist() for way in (1, -1))
-    for begin, end in zip(begins, ends, strict=True):
+    u, told = raw.record.input, []
+    for begin, end in runs_of(at):
         on = u[begin:end] - u[begin]
         way = np.sign(u[begin] - u[max(begin - _LEAST, 0)])
         travel = float((way * on).max())

@@ -19,11 +19,11 @@ from dataclasses import replace
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.causes.creep import Creep
-from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.stages.parameters import estimates_of
