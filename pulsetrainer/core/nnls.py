@@ -68,12 +68,8 @@ class Gram:
     """A matrix G (q, q) for many right sides; the factor of the last set of positive variables is kept."""
 
     def __init__(self, matrix: FloatArray) -> None:
-        q = len(matrix)
-        if matrix.shape != (q, q) or not np.all(np.isfinite(matrix)):
-            raise ArgumentError(
-                f"gram must be finite, of shape {(q, q)} like rhs, got {matrix.shape}",
-                hint="sum gram and rhs over the same finite samples",
-            )
+        if matrix.shape != (len(matrix), len(matrix)) or not np.all(np.isfinite(matrix)):
+            raise _unfit(matrix, len(matrix))
         self.matrix, self.size = matrix, np.abs(matrix)
         diagonal = np.diagonal(matrix)
         self.scale = float(diagonal.max(initial=0.0))
@@ -86,10 +82,7 @@ class Gram:
         """Return the non-negative minimiser: see ``solve``."""
         rhs = finite_vector("rhs", rhs)
         if self.matrix.shape != (rhs.size, rhs.size):
-            raise ArgumentError(
-                f"gram must be finite, of shape {(rhs.size, rhs.size)} like rhs, got {self.matrix.shape}",
-                hint="sum gram and rhs over the same finite samples",
-            )
+            raise _unfit(self.matrix, rhs.size)
         if passive is not None and passive.shape != rhs.shape:
             raise ArgumentError(
                 f"passive must have shape {rhs.shape}, got {passive.shape}",
@@ -141,6 +134,13 @@ class Gram:
             ridge = np.full(index.size, _RELATIVE_RIDGE * self.scale)
             self._factored = index, factor_of(self.matrix[np.ix_(index, index)], ridge)
         return self._factored[1]
+
+
+def _unfit(matrix: FloatArray, size: int) -> ArgumentError:
+    return ArgumentError(
+        f"gram must be finite, of shape {(size, size)} like rhs, got {matrix.shape}",
+        hint="sum gram and rhs over the same finite samples",
+    )
 
 
 def factor_of(matrix: FloatArray, ridge: FloatArray) -> Factor:

@@ -206,9 +206,7 @@ class Design:
 
     plane: Plane
     bins: Bins
-    nodes: (
-        scipy.sparse.csr_array | FloatArray
-    )  # B (count, n_q) in node space, or B A in cells where causes filter it
+    nodes: scipy.sparse.csr_array | FloatArray  # B (count, n_q) in nodes; B A in cells where causes filter it
     smoothing: float
 
     @classmethod

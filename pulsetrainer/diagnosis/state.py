@@ -85,9 +85,7 @@ class State:
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
     sights: Mapping[str, Sight] = field(default_factory=dict)  # of every cause that was screened
-    detectable: Mapping[str, float] = field(
-        default_factory=dict
-    )  # from which effects would show, of the span
+    detectable: Mapping[str, float] = field(default_factory=dict)  # shares of the span that would show
     extended: Model | None = None  # with those causes
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()

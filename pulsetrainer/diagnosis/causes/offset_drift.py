@@ -4,10 +4,7 @@ Drifts slow down as a device warms up, or grow, and most of that happens near on
 bend adds is zero at both ends of a record (0 to T), so the rate is the mean rate from end to end. If the
 drift falls by 1/e in the time 1/k, the bend is that of an exponential, with the same size in the middle. This
 finer formula is used only where noise cannot make the difference (`stages.exchange`): a slowing that is not
-there would move the zero.
-
-The search for causes refits the weights, which absorb much of a drift that is over soon. No record can then
-distinguish it from another zero, but the model as given can (`given_drift`).
+there would move the zero. A drift that is over soon, the model as given tells (`given_drift`).
 """
 
 from __future__ import annotations

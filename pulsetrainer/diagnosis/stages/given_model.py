@@ -285,21 +285,15 @@ def _in_another_condition(
             said.append(Evidence("overshadowed", figures=figures, names=gone))
             state = cleared
     if state.verdict != _CHANGED:
-        seen = replace(_evidence(changed, polarity), record=record)
-        said.append(seen)
-        state = _first(state, _finding(changed, polarity, seen))
+        figures = {
+            "shift": polarity * changed.shift,
+            "gain": PERCENT * changed.gain,
+            "times": 1.0 + changed.gain,
+            "left": changed.left,
+        }
+        said.append(Evidence(changed.kind, _CHANGED, figures, record=record))
+        state = _first(state, _finding(changed, polarity, said[-1]))
     return state, said
-
-
-def _evidence(changed: Change, polarity: int) -> Evidence:
-    """Return what a changed condition looks like."""
-    figures = {
-        "shift": polarity * changed.shift,
-        "gain": PERCENT * changed.gain,
-        "times": 1.0 + changed.gain,
-        "left": changed.left,
-    }
-    return Evidence(changed.kind, _CHANGED, figures)
 
 
 def _finding(changed: Change, polarity: int, seen: Evidence) -> Finding:
