@@ -29,11 +29,11 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NodeSums, NormalEquations, normal_equations, parted_sums
 from pulsetrainer.core.initial_state import near_ends
 from pulsetrainer.core.memory import Trace
+from pulsetrainer.core.metrics import correlation_time
 from pulsetrainer.core.operator import Preisach, follow
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane, Reading
 from pulsetrainer.core.record import Record

@@ -21,10 +21,10 @@ import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
 from pulsetrainer.core.identification import Identified, fits_dense
 from pulsetrainer.core.memory import State
+from pulsetrainer.core.metrics import correlation_time
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.record import Record, levelled

@@ -109,13 +109,8 @@ def best_dependence(
     first = int(np.argmax(scores))
     tau, part, own = found[first]
     axes = scipy.linalg.orth(own.astype(np.float64))
-
-    def free_of_both(columns: FloatArray) -> FloatArray:
-        left = bank.project(columns)
-        return np.asarray(left - axes @ (axes.T @ left))
-
     problem = fitted.problem
-    like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
+    like = noise_in(bank.residual, bank.project, axes, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
     best = float(scores[first])

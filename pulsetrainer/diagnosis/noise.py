@@ -67,15 +67,22 @@ class Noise:
 
 def noise_in(
     residual: FloatArray,
-    free: Callable[[FloatArray], FloatArray],
+    project: Callable[[FloatArray], FloatArray],
+    axes: FloatArray,
     bins: Bins,
     level: FloatArray,
     rng: np.random.Generator,
 ) -> Noise:
     """Return the noise of a residual (count,) at averaged outputs ``level`` (count,).
 
-    ``free`` takes from columns (count, k) all that was taken from the residual.
+    ``project`` takes from columns (count, k) what was taken from the residual; what goes along ``axes``
+    (count, m), orthonormal, causes could explain: what is left is taken for noise.
     """
+
+    def free(columns: FloatArray) -> FloatArray:
+        left = project(columns)
+        return np.asarray(left - axes @ (axes.T @ left))
+
     left = free(residual[:, None])
     scale = _scale(left[:, 0], bins, level)
     probes = free(rng.standard_normal((bins.count, LIMITS.probes)) * scale[:, None])

@@ -21,7 +21,7 @@ values.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -144,7 +144,7 @@ def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
     blocks = _blocks(fitted, fitted)
     if not blocks:
         return Screen()
-    noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
+    noise = noise_in(residual, project, _axes(blocks), problem.bins, problem.measured, rng)
     covariance = noise.covariance(project(_side_by_side(blocks)))
     known, critical = _p_values(blocks, residual, covariance, LIMITS.draws, rng)
     return Screen(_scores(fitted, blocks, residual, known, _sights(blocks, covariance, critical)), noise)
@@ -240,20 +240,12 @@ def _sights(blocks: Sequence[_Block], covariance: FloatArray, critical: float) -
     }
 
 
-def _less(
-    project: Callable[[FloatArray], FloatArray], blocks: Sequence[_Block]
-) -> Callable[[FloatArray], FloatArray]:
-    """Take from columns what weights and all causes could explain: what is left is taken for noise."""
+def _axes(blocks: Sequence[_Block]) -> FloatArray:
+    """Orthonormal columns (count, k) of all that causes could explain."""
     everything = _side_by_side(blocks)
     size, axes = np.linalg.eigh(everything.T @ everything)
     kept = size > LIMITS.rank**2 * size[-1]
-    axes = everything @ (axes[:, kept] / np.sqrt(size[kept]))
-
-    def free(columns: FloatArray) -> FloatArray:
-        left = project(columns)
-        return np.asarray(left - axes @ (axes.T @ left))
-
-    return free
+    return np.asarray(everything @ (axes[:, kept] / np.sqrt(size[kept])))
 
 
 def _at_full_rate(fitted: Fitted) -> list[FloatArray]:
