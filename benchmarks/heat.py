@@ -21,7 +21,7 @@ import pulsetrainer as pt
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.files.pulses import read_pulse
-from pulsetrainer.report.heat_figures import temperature
+from pulsetrainer.report.panels import temperature
 from pulsetrainer.steps.programme import Programme
 from pulsetrainer.steps.session import InMemory, perform
 from pulsetrainer.steps.stopped import raise_if_stopped

@@ -28,12 +28,13 @@ from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Trace
+from pulsetrainer.device.wording import UNKNOWN_REMEDY
 from pulsetrainer.diagnosis import wording
 from pulsetrainer.diagnosis.causes import fired_on
 from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
-from pulsetrainer.steps.stopped import UNKNOWN_REMEDY, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 from pulsetrainer.version import __version__
 
 State = Literal["ok", "warning", "problem"]
@@ -64,18 +65,6 @@ def _finding(name: str, found: str, *, warning: str | None = None, problem: str 
     return Finding(name, state, found, problem or warning or "")
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """All findings, in the order in which they were looked at."""
-
-    findings: tuple[Finding, ...]
-
-    @property
-    def problems(self) -> int:
-        """Findings that stand in the way."""
-        return sum(one.state == "problem" for one in self.findings)
-
-
 def examine(
     port: str | None = None,
     *,
@@ -84,7 +73,7 @@ def examine(
     settings: str = "",
     tuned: Path | None = None,
     progress: Callable[[float], None] = lambda _share: None,
-) -> Result:
+) -> list[Finding]:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
 
     ``limits`` hold meanwhile; ``settings`` says in words which are in force, ``tuned`` is the file with the
@@ -103,7 +92,7 @@ def examine(
     for number, look in enumerate(looks):
         found += look()
         progress((number + 1) / len(looks))
-    return Result(tuple(found))
+    return found
 
 
 # --- this computer ------------------------------------------------------------------------------------

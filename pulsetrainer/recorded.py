@@ -147,7 +147,8 @@ def session_into(
             done = replace(done, stopped_by_key=decide.stopped_by_key)
         quiz = blind.quiz(out.stem) if blind else None
         recorder.keep(done.fields | {"quiz": quiz}, header())
-        recorder.finish(complete=not done.fault, dropped_samples=done.dropped_samples)
+        recorder.dropped_samples = done.dropped_samples
+        recorder.finish(complete=not done.fault)
     return done, quiz
 
 

@@ -43,6 +43,11 @@ class Data:
     finite: bool = False  # NaN is refused
 
 
+def percent(quantity: str, dims: str = "") -> Data:
+    """Mark a field as a dataset in percent."""
+    return Data("percent", quantity, dims)
+
+
 @dataclass(frozen=True, slots=True)
 class Attribute:
     """Marks a text or number whose attribute in the file has another name than the field."""

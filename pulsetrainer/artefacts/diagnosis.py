@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import Annotated, ClassVar, NamedTuple
 
-from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.data import Data, FloatArray, percent
 from pulsetrainer.artefacts.model import Model, Parameter
 from pulsetrainer.artefacts.shown import Shown
 
@@ -23,7 +24,7 @@ class Cause:
     confounded_with: tuple[str, ...] = ()
     text: str = ""  # in words
     doubts: tuple[str, ...] = ()  # what speaks against a cause that was found, in words
-    detectable_from_percent: float = float("nan")  # smallest effect that would have shown, rms, of the span
+    detectable_from_percent: float = nan  # smallest effect that would have shown, rms, of the span
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,15 +87,11 @@ class Diagnosis(Shown):
     verdict: str  # a cause's id, "none", "inconclusive", "unknown" or "unlisted"
     quick: bool  # screened only: figures are those of linearised scores
     rms: Annotated[float, Data("@output_unit", "rms error of the model as it was given")]
-    rms_percent: Annotated[float, Data("percent", "rms error of the model as it was given, of the span")]
-    noise_percent: Annotated[float, Data("percent", "white noise of single samples, rms, of the span")]
-    static_percent: Annotated[
-        float, Data("percent", "rms residual of averages, weights refitted, of the span")
-    ]
-    extended_percent: Annotated[float, Data("percent", "rms residual of averages, extended, of the span")]
-    floor_percent: Annotated[
-        float, Data("percent", "rms residual of averages when nothing is wrong, of the span")
-    ]
+    rms_percent: Annotated[float, percent("rms error of the model as it was given, of the span")]
+    noise_percent: Annotated[float, percent("white noise of single samples, rms, of the span")]
+    static_percent: Annotated[float, percent("rms residual of averages, weights refitted, of the span")]
+    extended_percent: Annotated[float, percent("rms residual of averages, extended, of the span")]
+    floor_percent: Annotated[float, percent("rms residual of averages when nothing is wrong, of the span")]
     causes: tuple[Cause, ...]
     evidence: tuple[str, ...]
     next_experiment: str
@@ -110,7 +107,7 @@ class Diagnosis(Shown):
     output_unit: str = "N"
     input_quantity: str = ""  # of the model; empty in files of 0.1
     output_quantity: str = ""
-    held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
+    held_out_gain_percent: float = nan  # of all causes together; NaN where it was not measured
     lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records
     whole: bool = True  # False while what is left is more than noise
@@ -120,13 +117,11 @@ class Diagnosis(Shown):
     records: tuple[Recorded, ...] = ()
     correctable: tuple[str, ...] = ()  # faults of the measurement that were found, and can be taken out
     extended_rms_percent: Annotated[
-        float, Data("percent", "rms error of the extended model over single samples, of the span")
-    ] = float("nan")  # NaN where nothing was extended
+        float, percent("rms error of the extended model over single samples, of the span")
+    ] = nan  # NaN where nothing was extended
     polarity: int = 1  # of the model
     as_measured: bool = False  # signs of parameters are those of the output; False: of output times polarity
-    empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
-        "nan"
-    )
+    empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = nan
     in_model: tuple[str, ...] = ()  # causes found that the model as given contains already
 
     @property

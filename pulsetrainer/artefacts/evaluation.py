@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import nan
 from typing import Annotated, ClassVar
 
-from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.data import Data, FloatArray, percent
 from pulsetrainer.artefacts.model import Model
 from pulsetrainer.artefacts.shown import Shown
 
@@ -34,15 +34,13 @@ PUBLISHED: dict[str, dict[str, float]] = {
 class DriveError:
     """Errors of one drive, in percent of the full applied force, over all scored samples of all repeats."""
 
-    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
-    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
-    rms_error_percent: Annotated[float, Data("percent", "rms error, of full force")]
+    mean_abs_error_percent: Annotated[float, percent("mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, percent("largest absolute error, of full force")]
+    rms_error_percent: Annotated[float, percent("rms error, of full force")]
     hysteresis_percent: Annotated[
-        float, Data("percent", "loop area of force against target, of full force squared, per beat")
+        float, percent("loop area of force against target, of full force squared, per beat")
     ]
-    current_tracking_max_percent: Annotated[
-        float, Data("percent", "largest current tracking error, of the range")
-    ]
+    current_tracking_max_percent: Annotated[float, percent("largest current tracking error, of the range")]
     # (n,)
     output: Annotated[FloatArray, Data("@output_unit", "mean measured output over the repeats", "time")]
     output_unit: str = "N"
@@ -59,13 +57,13 @@ class WaveformEvaluation:
     target: Annotated[FloatArray, Data("@output_unit", "target", "time")]  # (n,)
     scaled: DriveError
     compensated: DriveError
-    mean_error_reduction_percent: Annotated[float, Data("percent", "reduction of the mean absolute error")]
+    mean_error_reduction_percent: Annotated[float, percent("reduction of the mean absolute error")]
     full_force: Annotated[float, Data("@output_unit", "full applied force")]
-    noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
+    noise_percent: Annotated[float, percent("spread between repeats, of full force")]
     output_unit: str = "N"
     # of the drive of which it is larger
     error_spread_percent: Annotated[
-        float, Data("percent", "standard deviation of the mean error from repeat to repeat, of full force")
+        float, percent("standard deviation of the mean error from repeat to repeat, of full force")
     ] = nan
     # (r,) before each compensated drive, where the heat was tracked
     temperature_K: Annotated[
@@ -85,9 +83,9 @@ class ModelEvaluation:
 
     name: str
     rms: Annotated[float, Data("@output_unit", "rms prediction error")]
-    rms_percent: Annotated[float, Data("percent", "rms prediction error, of the output span")]
-    max_percent: Annotated[float, Data("percent", "largest prediction error, of the output span")]
-    gain_percent: Annotated[float, Data("percent", "reduction of the rms against the first model")]
+    rms_percent: Annotated[float, percent("rms prediction error, of the output span")]
+    max_percent: Annotated[float, percent("largest prediction error, of the output span")]
+    gain_percent: Annotated[float, percent("reduction of the rms against the first model")]
     time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]  # thinned for the figures
     output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
@@ -95,14 +93,14 @@ class ModelEvaluation:
     # how far the measured output lies above the predicted one, and what is left when that is taken out
     offset: Annotated[float, Data("@output_unit", "offset of the run against the model")] = nan
     shape_rms_percent: Annotated[
-        float, Data("percent", "rms prediction error with the run's own offset, of the output span")
+        float, percent("rms prediction error with the run's own offset, of the output span")
     ] = nan
     # what a user has who sets the zero first: nothing of the half that is scored was known
     second_half_percent: Annotated[
-        float, Data("percent", "rms prediction error of the second half, with the zero of the first half")
+        float, percent("rms prediction error of the second half, with the zero of the first half")
     ] = nan
     start: str = "known"  # the state before the run: known, or which one was estimated
-    outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
+    outside_percent: Annotated[float, percent("samples outside the range of the model")] = 0.0
 
     @property
     def short_name(self) -> str:

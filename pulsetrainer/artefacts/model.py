@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray
+from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray, percent
 from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
@@ -25,8 +25,8 @@ class Fit:
 
     rms: Annotated[float, Data("@output_unit", "rms error of the fit")]
     max_abs: Annotated[float, Data("@output_unit", "largest error of the fit")]
-    rms_percent: Annotated[float, Data("percent", "rms error of the fit, of the output span")]
-    coverage_percent: Annotated[float, Data("percent", "cells switched on and off by the input")]
+    rms_percent: Annotated[float, percent("rms error of the fit, of the output span")]
+    coverage_percent: Annotated[float, percent("cells switched on and off by the input")]
     input_unit: str
     output_unit: str
     samples: int
@@ -46,7 +46,7 @@ class Fit:
     predicted_upper: Annotated[
         FloatArray | None, Data("@output_unit", "upper end of the predicted output", "time")
     ] = None
-    max_percent: Annotated[float, Data("percent", "largest error of the fit, of the output span")] = nan
+    max_percent: Annotated[float, percent("largest error of the fit, of the output span")] = nan
     # standard deviation; NaN where the records cannot tell
     input_noise: Annotated[float, Data("@input_unit", "noise of the measured input")] = nan
     false_reversals: int = 0  # taken out of the input before the fit

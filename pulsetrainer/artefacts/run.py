@@ -13,6 +13,7 @@ import numpy as np
 from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time
 from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.artefacts.time_steps import behind_turns
+from pulsetrainer.artefacts.units import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +109,9 @@ class Run(Shown):
         number = len(self.unseen_turns)
         if not number:
             return ""
-        plural = "s" if number > 1 else ""
         return (
-            f"the input may have turned unseen in {number} gap{plural} of the time stamps: "
-            "what follows counts only from where the input next reaches an end, since its memory is known "
-            "there"
+            f"the input may have turned unseen in {counted(number, 'gap')} of the time stamps: what follows "
+            "counts only from where the input next reaches an end, since its memory is known there"
         )
 
     @property

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pulsetrainer.artefacts.data import Data, FloatArray, check_equal_length, check_time
+from pulsetrainer.artefacts.data import Data, FloatArray, check_equal_length, check_time, percent
 from pulsetrainer.artefacts.shown import Shown
 
 # A finger tells two forces apart that differ by 7 %: X. D. Pang, H. Z. Tan, N. I. Durlach, Manual
@@ -27,7 +27,7 @@ class Beats:
     start_s: Annotated[FloatArray, Data("s", "start", "beat")]  # (b,)
     interval_s: Annotated[FloatArray, Data("s", "time to the next beat", "beat")]
     pulse: Annotated[NDArray[np.int64], Data("1", "number of the pulse, from 0", "beat")]
-    amplitude: Annotated[FloatArray, Data("percent", "amplitude, of the reach", "beat")]
+    amplitude: Annotated[FloatArray, percent("amplitude, of the reach", "beat")]
     gain: Annotated[FloatArray, Data("1", "height pressed, of that asked for", "beat")]
     late: Annotated[FloatArray, Data("s", "start pressed, after that asked for", "beat")]
     mean_error: Annotated[FloatArray, Data("@output_unit", "mean absolute error", "beat")]
@@ -110,17 +110,17 @@ class Session(Shown):
     pulses: tuple[str, ...]
     full_force: Annotated[float, Data("@output_unit", "largest target: what errors are given in percent of")]
     rate_cv_percent: Annotated[
-        float, Data("percent", "coefficient of variation of the rate pressed, of that asked for")
+        float, percent("coefficient of variation of the rate pressed, of that asked for")
     ]
     amplitude_cv_percent: Annotated[
-        float, Data("percent", "coefficient of variation of the height pressed, of that asked for")
+        float, percent("coefficient of variation of the height pressed, of that asked for")
     ]
     beat_timing_max_ms: Annotated[float, Data("ms", "farthest that a beat began from its time")]
-    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
-    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
+    mean_abs_error_percent: Annotated[float, percent("mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, percent("largest absolute error, of full force")]
     nrmse: Annotated[float, Data("1", "rms error, of the range of the target")]
     augmentation_index_error_percent: Annotated[
-        float, Data("percent", "largest error of the augmentation index of a pulse, of the index")
+        float, percent("largest error of the augmentation index of a pulse, of the index")
     ]
     mean_force: Annotated[float, Data("@output_unit", "mean target")]
     quiz: Quiz | None = None

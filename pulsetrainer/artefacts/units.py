@@ -11,9 +11,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Model, Run
 
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
 _PREFIXED_SYMBOLS = """
@@ -240,19 +243,7 @@ def with_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s"
 
 
-class Measured(Protocol):
-    """What has an input and an output, such as a run or a model."""
-
-    @property
-    def input_unit(self) -> str:
-        """Unit of the input."""
-
-    @property
-    def output_unit(self) -> str:
-        """Unit of the output."""
-
-
-def units_of(measured: Measured) -> str:
+def units_of(measured: Run | Model) -> str:
     """Return the units of an input and an output in words: ``A and N``; ``no units`` where there are none."""
     units = [shown(unit) for unit in (measured.input_unit, measured.output_unit)]
     return " and ".join(unit or "no unit" for unit in units) if any(units) else "no units"

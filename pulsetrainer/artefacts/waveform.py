@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time
+from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time, percent
 from pulsetrainer.artefacts.model import Model
 from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
@@ -18,9 +18,9 @@ class RefinePass:
     """The errors of one pass of refining, in percent of the full force, over all scored samples."""
 
     repeats: int
-    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
-    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
-    noise_percent: Annotated[float, Data("percent", "mean size of what repeats differ by, of full force")]
+    mean_abs_error_percent: Annotated[float, percent("mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, percent("largest absolute error, of full force")]
+    noise_percent: Annotated[float, percent("mean size of what repeats differ by, of full force")]
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -11,7 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.report.figure_formats import figure_format
+from pulsetrainer.cli.outputs import figure_format
 from pulsetrainer.report.tables import picked
 from pulsetrainer.steps.arguments import check_several
 

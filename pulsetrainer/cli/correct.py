@@ -43,11 +43,10 @@ def correct(
             error.hint = error.hint.replace("MODEL.h5", model)
             raise
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
-    from pulsetrainer.report.diagnosis_results import ELSEWHERE, UNSEEN, is_unchanged
-    from pulsetrainer.report.diagnosis_results import corrected as said_of
+    from pulsetrainer.report import diagnosis_results as results
 
-    if is_unchanged(measured, corrected):
-        why = UNSEEN if "quantisation" in corrected.corrected else ELSEWHERE
+    if results.is_unchanged(measured, corrected):
+        why = results.UNSEEN if "quantisation" in corrected.corrected else results.ELSEWHERE
         job.notes([f"{why}, so the output is left as it was"])
     job.notes(["a run that the model is tested on may have the same fault: diagnose and correct it too"])
-    job.show(*said_of(out, measured, corrected))
+    job.show(*results.corrected(out, measured, corrected))

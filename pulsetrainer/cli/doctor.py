@@ -8,7 +8,7 @@ from typing import Annotated
 
 from typer import Context, Option
 
-from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.next_step import as_options
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Port
 from pulsetrainer.files import settings
@@ -44,15 +44,15 @@ def doctor(
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
         held = Limits(limit_current_A, limit_force_N)
-        result = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
-    typed = [replace(f, found=as_options(f.found), fix=as_options(f.fix)) for f in result.findings]
-    result = replace(result, findings=tuple(typed))
-    problem = f"{result.problems} of {len(result.findings)} checks found a problem"
-    failed = QualityError(problem, hint="make the fixes in order, from the top") if result.problems else None
-    screen.result(plain(result) | {"problems": result.problems}, failed)
+        found = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
+    findings = [replace(one, found=as_options(one.found), fix=as_options(one.fix)) for one in found]
+    problems = sum(one.state == "problem" for one in findings)
+    said = f"{problems} of {len(findings)} checks found a problem"
+    failed = QualityError(said, hint="make the fixes in order, from the top") if problems else None
+    screen.result({"findings": findings, "problems": problems}, failed)
     if not json:
-        width = max(len(one.name) for one in result.findings)
-        for one in result.findings:
+        width = max(len(one.name) for one in findings)
+        for one in findings:
             lead = f"{_MARKS[one.state]:<8} {one.name:<{width}}  "
             if one.name in ("versions", "settings"):  # lists of words that nobody copies
                 screen.whole(folded(lead, one.found, min(_WIDTH, screen.width)))

@@ -31,9 +31,7 @@ def extend(
     """
     job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
     from pulsetrainer.files import provenance, store
-    from pulsetrainer.report.diagnosis_results import doubts_of
-    from pulsetrainer.report.diagnosis_results import extended as extended_by
-    from pulsetrainer.report.facts import extension_words
+    from pulsetrainer.report import diagnosis_results, facts
 
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
@@ -44,9 +42,9 @@ def extend(
         proof = () if other is None else pt.evaluate(other, [plain, extended]).models
         job.save(out, extended, f"Model extended by {', '.join(added)}")
     if verify is None:
-        job.notes(doubts_of(found, extended))
+        job.notes(diagnosis_results.doubts_of(found, extended))
     elif provenance.sha256_of(verify) in store.read_header(model).provenance.inputs.values():
         job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
-    job.show(*extended_by(out, extended, found, verify, proof))
+    job.show(*diagnosis_results.extended(out, extended, found, verify, proof))
     for one in extended.extensions:
-        job.screen.facts(f"with {one.cause}", extension_words(one))
+        job.screen.facts(f"with {one.cause}", facts.extension_words(one))

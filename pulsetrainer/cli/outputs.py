@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from os.path import realpath  # a link to itself is told when it is read
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from pulsetrainer.files.output_name import FORMATS, check_artefact_name, is_no_f
 
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
+_FIGURES = ("png", "svg", "pdf")
 
 
 def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
@@ -48,3 +50,18 @@ def _check_text(path: Path, what: str, right: str, then: str) -> None:
         return
     if ending in FORMATS | {""} and not (ending and right.startswith(ending)):  # .htm is a page too
         raise EndingError(path, what, right, then=then)
+
+
+def figure_format(path: Path, what: str, *more: str) -> str:
+    """Return the format that the name of a figure asks for; ``more`` are those that are no figures.
+
+    EndingError where it is none of them.
+    """
+    form, known = path.suffix.lower().lstrip("."), (*_FIGURES, *more)
+    if form in known:
+        return form
+    with suppress(OSError):  # a folder, or one that is locked, is told when it is looked at
+        if path.is_dir():
+            return _FIGURES[0]
+    written_as = f"{what} is written as {', '.join(known[:-1])} or {known[-1]}"
+    raise EndingError(path, written_as, ".png", usual="figure")

@@ -42,18 +42,16 @@ def play(
     """
     job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
-    from pulsetrainer.report.planned import to_be_played
-    from pulsetrainer.report.results import drive_title
-    from pulsetrainer.report.results import played as said_of
+    from pulsetrainer.report import planned, results
     from pulsetrainer.steps.play import plan
 
     waveform = job.load(drive, pt.Waveform)
-    title = drive_title(waveform)
+    title = results.drive_title(waveform)
     if dry_run:
         job.check_device()
-        planned = plan(waveform, repeats=repeats, track_heat=track_heat, limits=job.limits)
+        rehearsed = plan(waveform, repeats=repeats, track_heat=track_heat, limits=job.limits)
         what = {"name": waveform.name, "inversion": waveform.inversion, "repeats": repeats}
-        job.would(f"play {title}", planned, to_be_played(planned, repeats), **what)
+        job.would(f"play {title}", rehearsed, planned.to_be_played(rehearsed, repeats), **what)
         return
     stopped: PulsetrainerError | None = None
     top = max(waveform.compensated.max(), waveform.scaled.max())
@@ -84,7 +82,7 @@ def play(
 
         lost = counted(played.dropped_samples, "sample", "was", "were")
         job.notes([f"{lost} lost on the wire, and left out of all errors"])
-    job.show(*said_of(out, played, info.serial, info.firmware))
+    job.show(*results.played(out, played, info.serial, info.firmware))
 
 
 def _shown_by(view: LoopView, drive: pt.Waveform) -> Watch:

@@ -9,7 +9,7 @@ from typer import Argument, Context, Option
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.report.figure_formats import figure_format
+from pulsetrainer.cli.outputs import figure_format
 
 
 def plot(

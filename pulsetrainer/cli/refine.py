@@ -35,17 +35,16 @@ def refine(
     """
     job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
-    from pulsetrainer.report.planned import to_be_refined
-    from pulsetrainer.report.results import refined as said_of
+    from pulsetrainer.report import planned, results
     from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
     check(waveform, passes)
     if dry_run:
         job.check_device()
-        planned = plan(waveform, passes=passes, limits=job.limits)
-        rows = to_be_refined(planned, passes)
-        job.would(f"refine {waveform.name}", planned, rows, name=waveform.name, passes=passes)
+        rehearsed = plan(waveform, passes=passes, limits=job.limits)
+        rows = planned.to_be_refined(rehearsed, passes)
+        job.would(f"refine {waveform.name}", rehearsed, rows, name=waveform.name, passes=passes)
         return
     stopped: PulsetrainerError | None = None
     with job.working(f"refining {drive.name}") as progress, job.open_device(waveform.model) as device:
@@ -63,4 +62,4 @@ def refine(
         stopped.message += f"; the best of {len(refined.passes)} passes was kept in {out}"
         raise stopped
     job.notes(refined.notes[len(waveform.notes) :])
-    job.show(*said_of(out, refined, info))
+    job.show(*results.refined(out, refined, info))

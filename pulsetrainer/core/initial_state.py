@@ -136,6 +136,18 @@ def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
     return _second_stroke(away, back, reach) if away[0] < back[0] else _second_stroke(back, away, reach)
 
 
+def only_stroke(inputs: FloatArray, low: float, high: float) -> int:
+    """Where the first stroke of a record is over that begins at an end; 0 where a later one begins there."""
+    second = second_stroke(inputs, low, high)
+    if not second:
+        return 0
+    low, high = _reached(inputs, low, high)
+    reach = high - low
+    away = inputs - low if inputs[0] - low < high - inputs[0] else high - inputs
+    later = _strokes(away, inputs, reach)[1:]
+    return 0 if any(_told(one, reach) for one in later) else second
+
+
 def _second_stroke(away: FloatArray, back: FloatArray, reach: float) -> int:
     """Where the second stroke begins at the latest; 0 where there is none."""
     at_end = _at_end(away, NEAR * reach)
@@ -234,14 +246,17 @@ def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) 
     return Record(inputs, outputs, counts, start_of(inputs, low, high))
 
 
-def estimated_start(operator: Preisach | Dual, records: Sequence[Record]) -> tuple[State | None, str]:
+def estimated_start(
+    operator: Preisach | Dual, records: Sequence[Record], ends: tuple[float, float] | None = None
+) -> tuple[State | None, str]:
     """Return the state from which records are followed, whatever ``start`` they have, and its name.
 
-    Records that never reach an end of the operator's range leave open what came before them. Tried are both
-    saturations and the demagnetised state; the one with the least sum of squared errors is taken.
+    Records that never reach one of the ``ends`` (None: those of the operator's range) leave open what came
+    before them. Tried are both saturations and the demagnetised state; the one with the least sum of squared
+    errors is taken.
     """
     low, high = operator.low, operator.high
-    if any(reaches_an_end(r.input, low, high) for r in records):
+    if any(reaches_an_end(r.input, *(ends or (low, high))) for r in records):
         return None, "known"
     states = {
         "negative saturation": negative_saturation(low),

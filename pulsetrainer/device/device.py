@@ -25,7 +25,7 @@ from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire,
 from pulsetrainer.device.player import Player, tells_duty
 from pulsetrainer.device.schemes import Clock, OpenPort, Sleep
 from pulsetrainer.device.trace import FloatArray, Trace
-from pulsetrainer.device.wording import NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
+from pulsetrainer.device.wording import FLASH, NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 _LOG = logging.getLogger(__name__)
@@ -138,7 +138,7 @@ class Device:
                 f"{what} needs the duty of the coil's voltage; the device's firmware {self.info.firmware} "
                 f"speaks protocol {self.info.protocol}, which does not report it: that came with "
                 f"{codes.PROTOCOL_MAJOR}.{codes.DUTY_SINCE_MINOR}",
-                hint="flash the firmware that came with this program (make -C firmware)",
+                hint=FLASH,
             )
 
     @property
@@ -276,7 +276,7 @@ class Device:
             raise DeviceError(
                 f"the device's firmware {self.info.firmware} speaks protocol {self.info.protocol}, which has "
                 f"no open-ended waves; they came with {'.'.join(map(str, _STREAMS_SINCE))}",
-                hint="flash the firmware that came with this program (make -C firmware)",
+                hint=FLASH,
             )
         step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
         feed, lead = Feed(), round(lead_s * rate_Hz)

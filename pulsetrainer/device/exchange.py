@@ -10,7 +10,7 @@ from pulsetrainer.device import messages as m
 from pulsetrainer.device.frames import Frame, FrameReader, encode
 from pulsetrainer.device.schemes import TIMEOUTS_S, Clock
 from pulsetrainer.device.transport import Transport
-from pulsetrainer.device.wording import told
+from pulsetrainer.device.wording import FLASH, told
 from pulsetrainer.errors import DeviceError
 
 _HELLO_S = 3.0
@@ -173,7 +173,7 @@ class Exchange:
                 raise DeviceError(
                     f"the device on {self._port} says {name} = {getattr(reply, name)} in its greeting; "
                     "that must be above 0",
-                    hint="flash the firmware that came with this program (make -C firmware)",
+                    hint=FLASH,
                 )
 
     def _check_version(self, reply: m.HelloReply) -> None:
@@ -189,7 +189,7 @@ class Exchange:
                 return
             said = f"is of another generation than this program's firmware {_dotted(ours)}"
         if theirs < ours:
-            older, remedy = "device", "flash the firmware that came with this program (make -C firmware)"
+            older, remedy = "device", FLASH
         else:
             older, remedy = "program", "update this program: pip install --upgrade pulsetrainer"
         raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)

@@ -20,6 +20,7 @@ from pulsetrainer.device.schemes import Clock
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
+    UNKNOWN_REMEDY,
     describe_fault,
     describe_not_off,
     flows_A,
@@ -177,7 +178,7 @@ class Player:
             raise DeviceError(
                 "the device has switched off by itself since it was last asked: "
                 f"{describe_fault(status, self._hello.tick_rate_Hz)}",
-                hint=remedy_of(status.fault) or "remove the cause; the next command clears the fault",
+                hint=remedy_of(status.fault) or UNKNOWN_REMEDY,
             )
         self._request(m.ClearFault(*self.seen))
         self.seen = (0, 0)  # nor is it that of this play

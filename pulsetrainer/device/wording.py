@@ -9,6 +9,11 @@ from pulsetrainer.device import messages as m
 from pulsetrainer.device.limits import less_current
 
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
+# Faults of which the force sensor is the likely cause.
+FORCE_READING = (
+    codes.Fault.NO_FORCE, codes.Fault.FORCE_FROZEN, codes.Fault.FORCE_IMPLAUSIBLE, codes.Fault.FORCE_ZERO,
+    codes.Fault.FORCE_RAIL,
+)  # fmt: skip
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
     codes.Fault.OVER_FORCE: "if nothing pressed that hard, check the force sensor; if you lowered "
@@ -26,13 +31,11 @@ _REMEDY: dict[int, str] = {
     codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less, or with less current",
     codes.Fault.ON_TIME: "play it in several pieces",
     codes.Fault.WAVE_CRC: "check the cable, then run the command again",
-    codes.Fault.NO_FORCE: FORCE_REMEDY,
-    codes.Fault.FORCE_FROZEN: FORCE_REMEDY,
-    codes.Fault.FORCE_IMPLAUSIBLE: FORCE_REMEDY,
-    codes.Fault.FORCE_ZERO: FORCE_REMEDY,
-    codes.Fault.FORCE_RAIL: FORCE_REMEDY,
+    **dict.fromkeys(FORCE_READING, FORCE_REMEDY),
 }
 
+UNKNOWN_REMEDY = "remove the cause; the next command clears the fault"
+FLASH = "flash the firmware that came with this program (make -C firmware)"
 NOT_OFF_REMEDY = "pull the supply's plug, then have the device's output transistor and current sensor checked"
 _KINDS: dict[type[IntEnum], str] = {
     codes.Fault: "fault",

@@ -35,7 +35,7 @@ def question_of(
     DataError where runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is
     too short, or has too few samples with a number.
     """
-    low, high = _range_of(model, runs)
+    low, high = range_of(model, runs)
     *called, model_name = names
     records, notes, fingerprints, titles = [], [], [], []
     stamps: list[FloatArray | None] = []
@@ -107,7 +107,7 @@ def input_range(model: Model) -> tuple[float, float]:
     return min(operator.low, float(fit.input.min())), max(operator.high, float(fit.input.max()))
 
 
-def _range_of(model: Model, runs: Sequence[Run]) -> tuple[float, float]:
+def range_of(model: Model, runs: Sequence[Run]) -> tuple[float, float]:
     """Return the range between whose ends memory is wiped out: of a dual model where inputs went within it.
 
     A drift widens its operator, and no input comes near those ends.

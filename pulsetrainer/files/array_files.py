@@ -12,6 +12,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,11 +50,9 @@ def reader_of(path: Path) -> Callable[[Path], Columns] | None:
 
 
 def _read_npz(path: Path) -> Columns:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return _columns(path, dict(_arrays_in(file)))
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError, TypeError) as error:
-        raise _unreadable(path, "an .npz archive of numbers", error) from error
+    damage = (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError, TypeError)
+    with _read_as(path, "an .npz archive of numbers", *damage), np.load(path, allow_pickle=False) as file:
+        return _columns(path, dict(_arrays_in(file)))
 
 
 def _arrays_in(archive: Any) -> Iterator[tuple[str, Any]]:
@@ -67,11 +66,8 @@ def _arrays_in(archive: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _read_npy(path: Path) -> Columns:
-    try:
-        with path.open("rb") as stream:  # np.load would take an archive, too
-            array = np.lib.format.read_array(stream, allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise _unreadable(path, "a .npy array of numbers", error) from error
+    with _read_as(path, "a .npy array of numbers", ValueError, EOFError), path.open("rb") as stream:
+        array = np.lib.format.read_array(stream, allow_pickle=False)  # np.load would take an archive, too
     if array.dtype.names:
         return _columns(path, {name: array[name] for name in array.dtype.names})
     return _columns(path, {"column": array})
@@ -87,10 +83,9 @@ def _read_mat(path: Path) -> Columns:
     from scipy.io import loadmat  # noqa: PLC0415
     from scipy.io.matlab import MatReadError  # noqa: PLC0415
 
-    try:
+    damage = (MatReadError, ValueError, TypeError, NotImplementedError, LookupError, zlib.error)
+    with _read_as(path, "a MATLAB file", *damage):
         content = loadmat(path, squeeze_me=True, struct_as_record=True)
-    except (MatReadError, ValueError, TypeError, NotImplementedError, LookupError, zlib.error) as error:
-        raise _unreadable(path, "a MATLAB file", error) from error
     found: dict[str, Any] = {}
     for name, value in content.items():
         if not name.startswith("__"):
@@ -123,24 +118,19 @@ def _read_mat_73(path: Path) -> Columns:
             if "units" in node.attrs:
                 units[dotted] = str(np.asarray(node.attrs["units"]).item())
 
-    try:
-        with h5py.File(path) as file:
-            file.visititems(visit)
-    except (OSError, ValueError, TypeError) as error:
-        raise _unreadable(path, "a MATLAB 7.3 file", error) from error
+    with _read_as(path, "a MATLAB 7.3 file", OSError, ValueError, TypeError), h5py.File(path) as file:
+        file.visititems(visit)
     return _columns(path, found, units)
 
 
 def _read_wav(path: Path) -> Columns:
     from scipy.io import wavfile  # noqa: PLC0415
 
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", category=wavfile.WavFileWarning)
-            warnings.filterwarnings("error", message="Reached EOF", category=wavfile.WavFileWarning)
-            rate, samples = wavfile.read(path)
-    except (ValueError, EOFError, struct.error, wavfile.WavFileWarning) as error:
-        raise _unreadable(path, "a whole .wav file", error) from error
+    damage = (ValueError, EOFError, struct.error, wavfile.WavFileWarning)
+    with _read_as(path, "a whole .wav file", *damage), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=wavfile.WavFileWarning)
+        warnings.filterwarnings("error", message="Reached EOF", category=wavfile.WavFileWarning)
+        rate, samples = wavfile.read(path)
     channels = samples.reshape(samples.shape[0], -1)
     # integers count steps of the converter: 1 is full scale, as in every sound program
     zero, full = 0.0, 1.0
@@ -196,10 +186,15 @@ def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | N
     return Columns(values, rate, units or {}, left_out)
 
 
-def _unreadable(path: Path, kind: str, error: Exception) -> DataError:
-    said = f": {error}"
-    if "pickle" in said or "RIFF" in said:  # which is for programmers
-        said = ", or holds objects of Python's" if "pickle" in said else ""
-    return DataError(
-        f"{path} is not {kind} that can be read{said}", hint="save it again, or export it as CSV"
-    )
+@contextmanager
+def _read_as(path: Path, kind: str, *damage: type[Exception]) -> Iterator[None]:
+    """Raise DataError for the errors by which a library tells that a file is not of its kind."""
+    try:
+        yield
+    except damage as error:
+        said = f": {error}"
+        if "pickle" in said or "RIFF" in said:  # which is for programmers
+            said = ", or holds objects of Python's" if "pickle" in said else ""
+        raise DataError(
+            f"{path} is not {kind} that can be read{said}", hint="save it again, or export it as CSV"
+        ) from error

@@ -7,16 +7,16 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import DataError
 
 _COLUMNS = ("t_s", "rate", "amplitude", "pulse")
+Row = tuple[float, float | None, float | None, str | None]  # time (s), rate, amplitude (%) and pulse
 
 
-def read_changes(
-    path: Path, pulses: Sequence[str]
-) -> list[tuple[float, float | None, float | None, str | None]]:
-    """Return time (s), rate, amplitude (%) and pulse of each line; None where nothing changes.
+def read_changes(path: Path, pulses: Sequence[str]) -> list[Row]:
+    """Return what changes by each line; None where nothing does.
 
     DataError where the file cannot be read, or a line is not one of these, comes before the line above it, or
     asks for what a session of these ``pulses`` cannot press.
@@ -33,7 +33,7 @@ def read_changes(
                     f"{path} has {_columns(rows.fieldnames)}; expected t_s and any of rate, amplitude, pulse",
                     hint="write a header such as: t_s,rate,amplitude,pulse",
                 )
-            found: list[tuple[float, float | None, float | None, str | None]] = []
+            found: list[Row] = []
             for row in rows:
                 number = lines[rows.line_num - 1][0]
                 found.append(_change(path, number, row, pulses))
@@ -56,9 +56,7 @@ def _columns(names: Sequence[str] | None) -> str:
     return f"the column{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def _change(
-    path: Path, line: int, row: dict[str, str | None], pulses: Sequence[str]
-) -> tuple[float, float | None, float | None, str | None]:
+def _change(path: Path, line: int, row: dict[str, str | None], pulses: Sequence[str]) -> Row:
     said = {name: (value or "").strip() for name, value in row.items() if name in _COLUMNS}
     numbers: list[float | None] = []
     for name in _COLUMNS[:3]:
@@ -113,7 +111,7 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
             )
     if len(answers) < questions:
         raise DataError(
-            f"{path} has {len(answers)} answer{'s' * (len(answers) != 1)} to {questions} questions",
+            f"{path} has {counted(len(answers), 'answer')} to {questions} questions",
             hint="write one pulse name on each line, as many as questions",
         )
     return [said if said in choices else written[said.casefold()] for _, said in answers]

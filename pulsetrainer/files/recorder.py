@@ -164,14 +164,12 @@ class RunRecorder:
                 hint="free some space, or write to another disk; what was recorded so far is kept",
             )
 
-    def finish(self, *, complete: bool = True, dropped_samples: int | None = None) -> Path:
+    def finish(self, *, complete: bool = True) -> Path:
         """Give the run its final name and return it; ``complete``: all that was asked for was recorded.
 
         DataError where nothing was recorded, or the disk failed: the recording is kept in ``partial``;
         UsageError where another process wrote the final name meanwhile; the recording is kept in ``partial``.
         """
-        if dropped_samples is not None:
-            self.dropped_samples = dropped_samples
         if self._complete is None:
             self._complete = complete
         if not self.partial.exists():  # the run has its name, or nothing was recorded

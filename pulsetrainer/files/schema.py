@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import types
-import typing
 from dataclasses import MISSING, dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -106,8 +105,3 @@ def plan_of(cls: type) -> tuple[FieldPlan, ...]:
             default = field.default_factory()
         plans.append(FieldPlan(field.name, role, item, optional, default, data, attribute))
     return tuple(plans)
-
-
-def kind_of(cls: type) -> str:
-    """Return the kind's name: ``run``, ``model`` and so on."""
-    return typing.cast("str", cls.kind)  # type: ignore[attr-defined]

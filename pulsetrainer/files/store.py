@@ -23,7 +23,7 @@ from pulsetrainer.files.encode import Later, encode, values_of
 from pulsetrainer.files.input_file import check_artefact, is_journal, unreadable
 from pulsetrainer.files.journal import Recording
 from pulsetrainer.files.provenance import Header, Provenance, clean
-from pulsetrainer.files.schema import TIME, kind_of, plan_of
+from pulsetrainer.files.schema import TIME, plan_of
 from pulsetrainer.files.unfailing_file import UnfailingFile
 from pulsetrainer.version import __version__
 
@@ -78,9 +78,9 @@ def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
     return None
 
 
-def _write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
+def _write_root(file: h5py.File, cls: type[Any], header: Header, *, samples: int | None) -> None:
     texts = {
-        "kind": kind_of(cls),
+        "kind": cls.kind,
         "title": clean(header.title),
         "created": clean(header.created),
         "history": "\n".join(clean(line) for line in header.history),
@@ -101,9 +101,9 @@ def read(path: Path | str, kind: type[K]) -> K:
     return read_one_of(path, kind)
 
 
-def read_one_of(path: Path | str, *kinds: type) -> Any:
+def read_one_of(path: Path | str, *kinds: type[Any]) -> Any:
     """Read an artefact of any of these kinds; raises as ``read``."""
-    expected = [kind_of(kind) for kind in kinds]
+    expected = [kind.kind for kind in kinds]
     recording = _recording(path)
     if recording is not None:
         if type(recording.artefact) not in kinds:

@@ -165,21 +165,10 @@ def ranking(found: Diagnosis) -> Figure:
     figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
     share = [max(one.explains_percent, 1e-3) for one in shown]
-    axes.barh(
-        [one.cause for one in shown],
-        share,
-        color=[_SHADES[answer(one, found).partition(":")[0]] for one in shown],
-        height=0.62,
-    )
-    for k, one in enumerate(shown):
-        axes.annotate(
-            answer(one, found),
-            (max(one.explains_percent, 1e-3), k),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8.5,
-        )
+    answers = [answer(one, found) for one in shown]
+    shades = [_SHADES[said.partition(":")[0]] for said in answers]
+    bars = axes.barh([one.cause for one in shown], share, color=shades, height=0.62)
+    axes.bar_label(bars, answers, padding=4, fontsize=8.5)
     axes.set_xlim(0.0, 1.7 * max([*share, 1.0]))  # room for the words beside the bars
     ticks = axes.get_xticks()
     ends = max((tick for tick in ticks if tick <= _WHOLE), default=0.0)  # but no share over 100 %

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure, FigureBase
 from pulsetrainer.artefacts import (
     Diagnosis,
     Evaluation,
+    FloatArray,
     Model,
     Playback,
     Run,
@@ -23,7 +24,7 @@ from pulsetrainer.artefacts import (
     WaveformEvaluation,
 )
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import diagnosis_figures, heat_figures, panels, session_figures
+from pulsetrainer.report import diagnosis_figures, panels, session_figures
 from pulsetrainer.report.directions import directions
 from pulsetrainer.report.style import (
     COLUMN_IN,
@@ -121,7 +122,7 @@ def playback(played: Playback) -> Figure:
         axes.sharex(error)
         axes.tick_params(labelbottom=False)
     if kelvin is not None and rows > 3:
-        heat_figures.temperature_of_repeats(panes[3], kelvin)
+        panels.temperature_of_repeats(panes[3], kelvin)
     panels.trace(force, asked.time_s, asked.target, **TARGET, label="target")
     for name, drive, style in (
         ("scaled", played.scaled, SCALED),
@@ -139,6 +140,16 @@ def playback(played: Playback) -> Figure:
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)
+    return figure
+
+
+@styled
+def temperature(told_K: FloatArray) -> Figure:
+    """Return the coil's temperature before each repeat (r,), K."""
+    figure = _sheet(0.6 * COLUMN_IN, 2.4)  # few points: a small figure
+    axes = figure.add_subplot()
+    panels.temperature_of_repeats(axes, told_K)
+    axes.set_title("Coil temperature")
     return figure
 
 

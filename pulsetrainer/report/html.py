@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from pulsetrainer.artefacts import Evaluation, FloatArray, Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
 from pulsetrainer.artefacts.units import shown
-from pulsetrainer.report import diagnosis_figures, figures, heat_figures, panels, session_figures
+from pulsetrainer.report import diagnosis_figures, figures, panels, session_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
 from pulsetrainer.report.facts import loop_drawn
 from pulsetrainer.report.names import NAMES, OVERVIEW, beyond_rounding, digits
@@ -172,23 +172,9 @@ def environment() -> Environment:
     made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
-    tools = (
-        number,
-        known,
-        offset,
-        count,
-        metric,
-        picture,
-        reach,
-        densest,
-        label,
-        panels.titled,
-        panels.scale,
-        loop_drawn,
-    )
-    for tool in tools:
+    for tool in (number, known, offset, count, metric, picture, reach, densest, label, loop_drawn):
         made.globals[tool.__name__] = tool
-    for drawing in (figures, heat_figures, diagnosis_figures, session_figures, panels):
+    for drawing in (figures, diagnosis_figures, session_figures, panels):
         made.globals[drawing.__name__.rpartition(".")[2]] = drawing
     return made
 

@@ -199,23 +199,18 @@ def fit(
     loop.set_xlabel(label(input_quantity, record.input_unit))
     loop.set(ylabel=label(output_quantity, record.output_unit), title="Measured and model")
     headroom(loop, 0.1)
-    x, name = abscissa(record.time_s, record.output.size)
-    residual(below, x, record.output - record.predicted, record.rms)
-    below.set(xlabel=name, ylabel=label("residual", record.output_unit))
-    below.set_title(residual_title(record.rms_percent))
+    residual(below, record)
 
 
-def residual_title(rms_percent: float) -> str:
-    """Return what stands above a residual: how large it is."""
-    return f"Residual: rms {rms_percent:.3g} % of span (dotted: ± rms)"
-
-
-def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
-    """Draw a residual between lines at plus and minus its rms."""
-    trace(axes, x, difference, **ERROR)
+def residual(axes: Axes, of: Fit | ModelEvaluation) -> None:
+    """Draw what a model leaves over time, between lines at plus and minus its rms."""
+    x, name = abscissa(of.time_s, of.output.size)
+    trace(axes, x, of.output - of.predicted, **ERROR)
     axes.axhline(0.0, **GUIDE)
-    for y in (-rms, rms):
+    for y in (-of.rms, of.rms):
         axes.axhline(y, **{**GUIDE, "color": INK, "zorder": 3})
+    axes.set(xlabel=name, ylabel=label("residual", of.output_unit))
+    axes.set_title(f"Residual: rms {of.rms_percent:.3g} % of span (dotted: ± rms)")
 
 
 def prediction(
@@ -226,7 +221,7 @@ def prediction(
     With ``reach`` the residual is drawn from -reach to reach, so that several models compare by eye.
     """
     above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
-    x, name = abscissa(model.time_s, model.output.size)
+    x, _ = abscissa(model.time_s, model.output.size)
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
     above.set_ylabel(label(quantity or quantity_of(model.output_unit), model.output_unit))
@@ -234,11 +229,9 @@ def prediction(
         textwrap.fill(f"Prediction by {PurePath(model.name).stem}", _TITLE, break_on_hyphens=False)
     )
     headroom(above)
-    residual(below, x, model.output - model.predicted, model.rms)
+    residual(below, model)
     if reach is not None and np.isfinite(reach) and reach > 0:
         below.set_ylim(-1.05 * reach, 1.05 * reach)
-    below.set(xlabel=name, ylabel=label("residual", model.output_unit))
-    below.set_title(residual_title(model.rms_percent))
 
 
 def largest_residual(models: Sequence[ModelEvaluation]) -> float:
@@ -384,6 +377,26 @@ def unscored(axes: Axes, waveform: Waveform, name: str = "not scored") -> None:
             lw=0,
             label=name or None if start == 0 else None,
         )
+
+
+def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was than at calibration, as the duty tells, arrays (w,) in s and K."""
+    trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
+    _finish_temperature(axes, "time [s]", 0.4)  # a low panel, of which a legend is a large part
+
+
+def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was before each repeat (r,), K."""
+    axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
+    _finish_temperature(axes, "repeat", 0.16)
+    axes.margins(x=0.04)  # a point is whole at either end
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _finish_temperature(axes: Axes, over: str, share: float) -> None:
+    axes.axhline(0.0, **GUIDE)
+    axes.set(ylabel="coil, against\ncalibration [K]", xlabel=over)
+    headroom(axes, share)
 
 
 def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: dict[str, Any]) -> None:

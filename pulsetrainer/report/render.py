@@ -56,9 +56,8 @@ def inline_svg(figure: Figure, *, identifier: str, title: str, description: str)
     root.set("role", "img")
     root.set("class", "plot")
     wide, tall = figure.get_size_inches()
-    root.set(
-        "style", f"--wide:{wide:g};--tall:{tall:g}"
-    )  # inches: at this size its letters are as in SETTINGS
+    # inches: at this size its letters are as in SETTINGS
+    root.set("style", f"--wide:{wide:g};--tall:{tall:g}")
     root.set("aria-labelledby", f"{identifier}-title {identifier}-desc")
     for name, text in (("desc", description), ("title", title)):
         child = ET.Element(f"{{{_SVG}}}{name}", {"id": f"{identifier}-{name}"})

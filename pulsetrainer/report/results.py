@@ -294,12 +294,9 @@ def worse(evaluation: Evaluation) -> list[str]:
 
 def full_force(evaluation: Evaluation) -> str:
     """Say what errors of played waveforms are given in percent of; empty where there are none."""
-    rows = [
-        (w.full_force, w.output_unit, f"{w.name}, {w.inversion}") for w in evaluation.told_apart().waveforms
-    ]
     named: dict[str, str] = {}
-    for force, unit, name in rows:  # the first that has it
-        named.setdefault(with_unit(f"{force:.4g}", unit), name)
+    for w in evaluation.told_apart().waveforms:  # the first that has it
+        named.setdefault(with_unit(f"{w.full_force:.4g}", w.output_unit), f"{w.name}, {w.inversion}")
     told = named if len(named) == 1 else [f"{value} ({name})" for value, name in named.items()]
     return f"{', '.join(told)}, the top of the pulse that was asked for" if named else ""
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pulsetrainer.artefacts import Score, Session
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.report.html import number, page
 from pulsetrainer.report.names import NAMES, told
 
@@ -36,16 +37,13 @@ def render_session(
     ``asked`` are the options of the session; without them the sheet does not tell the rhythm.
     """
     quiz = session.quiz if score is not None else None
-    count = np.bincount(session.beats.pulse, minlength=len(session.pulses))
+    count = np.bincount(session.beats.pulse, minlength=len(session.pulses)).tolist()
     value = {name: told(name, getattr(session, name)) for name, _ in _FIGURES}
     return page(
         "session.html.j2",
         **header,
         session=session,
-        pressed=[
-            f"{name}: {number} beat{'s' * (number != 1)}"
-            for name, number in zip(session.pulses, count.tolist(), strict=True)
-        ],
+        pressed=[f"{name}: {counted(k, 'beat')}" for name, k in zip(session.pulses, count, strict=True)],
         rhythm=_rhythm(asked) if asked else None,
         rows=[(*NAMES[name], number(value[name], name, form)) for name, form in _FIGURES],
         quiz=quiz,

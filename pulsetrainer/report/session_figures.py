@@ -8,7 +8,7 @@ from matplotlib.patches import Rectangle
 
 from pulsetrainer.artefacts import Quiz, Session
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import heat_figures, panels
+from pulsetrainer.report import panels
 from pulsetrainer.report.style import BLUE, COLUMN_IN, COMPENSATED, TARGET, VERMILION, label, styled
 
 SHOWN_S = 6.0
@@ -32,7 +32,7 @@ def course(session: Session) -> Figure:
     else:
         figure = Figure(figsize=(COLUMN_IN, 5.6), layout="constrained")
         above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
-        heat_figures.temperature(lowest, warm_s, warm_K)
+        panels.temperature(lowest, warm_s, warm_K)
         lowest.sharex(below)  # both go over the whole session
         below.tick_params(labelbottom=False)
     middle = session.time_s[session.time_s.size // 2]

@@ -30,7 +30,6 @@ _STANDS_OUT = 0.02  # of the sharpest bend: a smaller one is no wave
 class Ledger:
     """What was given out and not yet measured, and the sums of what was."""
 
-    pulses: tuple[str, ...]
     _given: deque[Given] = field(default_factory=deque)
     _measured: FloatArray = field(default_factory=lambda: np.zeros(0))  # of the first given piece
     _rows: array[float] = field(default_factory=lambda: array("d"))

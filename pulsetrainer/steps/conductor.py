@@ -42,6 +42,15 @@ class Play:
     bpm: float | None = None  # None: the pulse's own rate
     cut_s: float = np.inf  # time after which even a beat under way ends: a question ends on time
 
+    def changed(self, pulse: int | None, amplitude: float | None, bpm: float | None) -> Play:
+        """Return the decision with these in the place of its own; None: as it is."""
+        return replace(
+            self,
+            pulse=self.pulse if pulse is None else pulse,
+            amplitude=self.amplitude if amplitude is None else amplitude,
+            bpm=self.bpm if bpm is None else bpm,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Rest:

@@ -22,10 +22,11 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.artefacts.units import same_units, units_of
 from pulsetrainer.core import metrics, wild
-from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
+from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, only_stroke
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
+from pulsetrainer.diagnosis.question import input_range, range_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import check_measured, named, several
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
@@ -35,6 +36,8 @@ from pulsetrainer.steps.one_thread import one_thread
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 _TOLD = 0.1  # % of the samples, in figures
+_MISSED = 3.0  # times the error of all that follows: a first stroke that nothing can be compared with ...
+# ... and that every model misses so far is that of a device that was never cycled before
 
 
 @one_thread
@@ -160,7 +163,10 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 f"{title} was identified in {units_of(model)}, but {name} is in {units_of(run)}",
                 hint="use a model of the same device; in other units, convert the columns and import again",
             )
-        one = _of_model(title, model, run, found[0].rms if found else None)
+    counted, first_strokes = _counted(name, run, models)
+    notes += first_strokes
+    for title, model in zip(model_names, models, strict=True):
+        one = _of_model(title, model, run, counted, found[0].rms if found else None)
         if model.fit and model.fit.warning:
             warnings.append(f"{title}: {model.fit.warning}")
         if _is_fitted_to(model, run):
@@ -175,11 +181,6 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         if one.start != "known":
             notes.append(f"{name} does not reach the ends of {title}; state before it: {one.start}")
-        operator = operator_of(model)
-        for part in run.parts(SHORTEST_PART):
-            said = first_stroke_words(part.input, part.output, operator.low, operator.high)
-            if said and f"{name}: {said}" not in notes:
-                notes.append(f"{name}: {said}")
         misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
     return Evaluation(
@@ -207,14 +208,65 @@ def _is_fitted_to(model: Model, run: Run) -> bool:
     return np.array_equal(run.time_s[at], fit.time_s) and np.array_equal(run.output[at], fit.output)
 
 
-def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> ModelEvaluation:
-    """Return the prediction error of one model; its gain is over ``first_rms``."""
+def _counted(name: str, run: Run, models: Sequence[Model]) -> tuple[list[tuple[Run, BoolArray]], list[str]]:
+    """Return the parts of a run with the samples (n,) of each that count, and notes about first strokes.
+
+    All models are compared on the same samples: those at which the memory of each of them is known.
+    """
+    counted, notes = [], []
+    for part in to_their_tips(list(run.parts(SHORTEST_PART))):
+        begin, why = _begin(part, run.dt_s, models)
+        notes += [f"{name}: {why}"] if why else []
+        kept = part.counts
+        kept[:begin] = False
+        counted.append((part, kept))
+    return counted, notes
+
+
+def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int, str]:
+    """Return the first sample (n,) of a part that counts, and which first stroke is left out, in words."""
+    ends = [range_of(model, [part]) for model in models]
+    by_input = max(known_from(part.input, low, high) for low, high in ends)
+    begin = max(_known_from(part, dt_s, model) for model in models)
+    if begin > by_input:
+        return begin, left_out_words(begin - by_input)
+    only = max(only_stroke(part.input, low, high) for low, high in ends)
+    if only and all(_misses(part, only, dt_s, model) for model in models):
+        return only, (
+            f"the first stroke ({only} samples) is left out: its error is more than {_MISSED:g} times that "
+            "of all that follows, like that of a device that was never cycled before"
+        )
+    return begin, ""
+
+
+def _known_from(part: Run, dt_s: float | None, model: Model) -> int:
+    """Return the first sample (n,) at which a model's memory is known.
+
+    A lag or a drift hides that a first stroke is apart from the others. An extended model tells it in the
+    output less what its causes add, as a diagnosis does.
+    """
+    low, high = range_of(model, [part])
+    outputs = [part.output]
+    if model.extensions:
+        outputs.append(part.output - predict(model, part.input, dt_s) + operator_of(model)(part.input))
+    return max(known_from(part.input, low, high, one) for one in outputs)
+
+
+def _misses(part: Run, first: int, dt_s: float | None, model: Model) -> bool:
+    """Whether a model misses the first samples of a part far more than the others."""
+    error = np.where(part.counts, part.output - predict(model, part.input, dt_s), 0.0)
+    after = metrics.root_mean_square(error[first:])
+    return metrics.root_mean_square(error[:first]) > _MISSED * after
+
+
+def _of_model(
+    name: str, model: Model, run: Run, counted: Sequence[tuple[Run, BoolArray]], first_rms: float | None
+) -> ModelEvaluation:
+    """Return the prediction error of one model on what is ``counted``; its gain is over ``first_rms``."""
     operator = operator_of(model)
-    low, high = operator.low, operator.high
-    parts = to_their_tips(list(run.parts(SHORTEST_PART)))
-    counted = [(part, _known(part, low, high)) for part in parts]
+    low, high = input_range(model)
     records = [Record(part.input, part.output, known.astype(np.float64)) for part, known in counted]
-    start, state = estimated_start(operator, records)
+    start, state = estimated_start(operator, records, range_of(model, [part for part, _ in counted]))
     if model.extensions and start is not None:  # these are predicted from rest
         state = "negative saturation, as for every extended model"
     predicted = np.concatenate(
@@ -257,13 +309,6 @@ def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
     error = measured - predicted
     left = error[half:] - np.mean(error[:half])
     return 100.0 * metrics.root_mean_square(left) / float(np.ptp(measured)) if half else float("nan")
-
-
-def _known(run: Run, low: float, high: float) -> BoolArray:
-    """Tell which samples (n,) count: from where the memory is known, but those that are masked."""
-    kept = run.counts
-    kept[: known_from(run.input, low, high, run.output)] = False
-    return kept
 
 
 # --- bounds -----------------------------------------------------------------------------------------------

@@ -105,8 +105,8 @@ def _verified(model: Model, extended: Model, run: Run) -> Model:
             hint="import it again with `time` COLUMN or `rate_Hz` HZ",
         )
 
-    def error(one: Model) -> float:
-        return evaluate(run, one).models[0].rms
+    def error(one: Model) -> float:  # on the samples that count for the extended model too
+        return evaluate(run, [extended, one]).models[-1].rms
 
     best, least = extended, error(extended)
     for left_out in extended.extensions:

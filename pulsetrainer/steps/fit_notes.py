@@ -21,9 +21,8 @@ POOR = 0.05  # of the output's span, rms: a model that leaves more of what is no
 MUCH = LIMITS.matters  # of the output's span, rms: who leaves more should ask why ...
 MANY = 3.0  # ... where that is so many times the noise of single samples
 _UNCOUNTED = 1000.0  # times the noise: more is not counted
-TOLD_APART = (
-    20.0  # % of the cells, by minor loops: where fewer are, nothing tells whether loops are congruent
-)
+# % of the cells, by minor loops: where fewer are, nothing tells whether loops are congruent
+TOLD_APART = 20.0
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 

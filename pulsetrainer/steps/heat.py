@@ -108,23 +108,39 @@ def take_temperature(device: Device, thermometer: Thermometer, high_A: float) ->
         )
 
 
-class Correction:
-    """Makes the compensated drive again where the heat has changed.
+class Tracked:
+    """A play whose heat is tracked: the compensated drive is made again where that has changed.
 
         u' = u + M^-1[y0 + (target - y0) / (1 - loss)] - M^-1[target],   y0 the force without current
 
     so that what was learnt beyond the model stays. What is out of reach is clipped, as the inverse does.
     """
 
-    def __init__(self, drive: Waveform, model: Model) -> None:
+    def __init__(self, drive: Waveform, model: Model, thermometer: Thermometer) -> None:
         part = invertible(model, drive.rate_Hz)
-        self._model, self._part, self._drive = model, part, drive
+        self._model, self._part, self._drive, self._thermometer = model, part, drive, thermometer
         self._body = slice(part.lead.size, drive.target.size - part.tail.size)
         self._kept = (0.0, drive.compensated)
         self._cold: FloatArray | None = None
+        self.temperatures: list[float] = []  # at each compensated drive, K
 
-    def current(self, loss: float) -> FloatArray:
-        """Current (n,) in A for a share of the force that is lost."""
+    @classmethod
+    def of(cls, drive: Waveform, device: Device, asked: bool | None) -> Tracked | None:
+        """Return the play of a drive; None where heat is not tracked. Raises as ``thermometer_of``."""
+        thermometer = thermometer_of(drive.model, device, asked=asked)
+        return cls(drive, drive.model, thermometer) if drive.model and thermometer else None
+
+    def take(self, rows: FloatArray, duty: FloatArray) -> None:
+        """Take in what a play brought back: reference, current and force (3, n), and the duty (n,)."""
+        self._thermometer.restart()
+        there = np.isfinite(duty)
+        self._thermometer.add(self._drive.time_s[there], rows[0][there], rows[1][there], duty[there])
+
+    def current(self) -> FloatArray:
+        """Current (n,) in A of the compensated drive for the heat of now."""
+        self._thermometer.restart()
+        self.temperatures.append(self._thermometer.temperature_K)
+        loss = self._thermometer.extra
         if abs(loss - self._kept[0]) > _NEW:
             if self._cold is None:
                 self._cold = self._made(0.0)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import quantity_in_words, same_units, shown, units_of, with_unit
+from pulsetrainer.artefacts.units import counted, quantity_in_words, same_units, shown, units_of, with_unit
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, little_words, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -328,9 +328,8 @@ def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
         return []
     worst = max(cleaned, key=lambda clean: clean.removed)
     sigma, band = with_unit(f"{worst.sigma:.2g}", unit), with_unit(f"{worst.dead_band:.2g}", unit)
-    kept = sum(clean.kept for clean in cleaned)
+    left = counted(sum(clean.kept for clean in cleaned), "real one", "is left", "are left")
     found = f"noise of {sigma} in the measured input"
-    left = "1 real one is left" if kept == 1 else f"{kept} real ones are left"
     return [f"{found} made {removed} false reversals, all below {band}: taken out; {left}"]
 
 

@@ -13,7 +13,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, Fault
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.trace import Trace
-from pulsetrainer.device.wording import FORCE_REMEDY
+from pulsetrainer.device.wording import FORCE_READING, FORCE_REMEDY
 from pulsetrainer.errors import ArgumentError, DeviceError
 from pulsetrainer.steps.loop_gains import OPEN_LOOP
 from pulsetrainer.steps.progress import Progress
@@ -45,10 +45,7 @@ _REMEDY: dict[int, str] = {
     Fault.OVER_FORCE: "keep everything off the device while it is tuned, and check its force and current "
     "sensors; or raise `limit_force_N` where it was lowered",
     Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor",
-    **dict.fromkeys(
-        (Fault.NO_FORCE, Fault.FORCE_FROZEN, Fault.FORCE_IMPLAUSIBLE, Fault.FORCE_ZERO, Fault.FORCE_RAIL),
-        _SENSOR,
-    ),
+    **dict.fromkeys(FORCE_READING, _SENSOR),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.artefacts import Waveform
-from pulsetrainer.artefacts.units import with_seconds
+from pulsetrainer.artefacts.units import counted, with_seconds
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
@@ -34,7 +34,7 @@ def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shap
     found = find_beats(recording)
     lengths = found.periods_s
     notes.append(
-        f"{recording.name} holds {found.count} whole beat{'s' if found.count > 1 else ''} of "
+        f"{recording.name} holds {counted(found.count, 'whole beat')} of "
         f"{lengths.min():.3f} to {lengths.max():.3f} s ({60.0 / float(np.mean(lengths)):.0f} a minute)"
     )
     return found.mean() if beat == "mean" else found.single(int(beat))

@@ -36,16 +36,8 @@ _FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier t
 class Sink(Protocol):
     """Where a session goes while it is pressed."""
 
-    def append(
-        self,
-        time_s: FloatArray,
-        target: FloatArray,
-        reference: FloatArray,
-        current: FloatArray,
-        force: FloatArray,
-        /,
-    ) -> None:
-        """Take samples in, arrays (n,) in s, N, A, A and N."""
+    def append(self, *columns: FloatArray) -> None:
+        """Take in time, target, reference, current and force, (n,) in s, N, A, A and N."""
 
     def judge(self, fields: Mapping[str, Any], /) -> None:
         """Take in what the session amounts to so far: before the first samples, and after every beat."""
@@ -111,7 +103,7 @@ class Performance:
         self._loss = 0.0 if thermometer is None else thermometer.extra
         self._warmth: list[tuple[float, float]] = []  # s and K, of each window
         self._pulses = tuple(pulse.name for pulse in pulses)
-        self._ledger = Ledger(self._pulses)
+        self._ledger = Ledger()
         self._reach = reach
         self._conductor = Conductor(
             extended_of(model), pulses, reach, rhythm, decide, self._ledger.give,

@@ -9,11 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from pulsetrainer.artefacts import DrivePlayback, Model, Playback, Waveform
+from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.limits import Limits, Rehearsal, check_force, check_peak
@@ -22,7 +21,7 @@ from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError
-from pulsetrainer.steps.heat import Correction, coil_of, thermometer_of
+from pulsetrainer.steps.heat import Tracked, coil_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -125,7 +124,7 @@ def play(
     _check(drive, repeats)
     drives = np.concatenate((drive.compensated, drive.scaled))
     check_peak(drives, device.info.current_limit_A, hint=_elsewhere(drive))
-    tracked = _Tracked.of(drive, device, track_heat)
+    tracked = Tracked.of(drive, device, track_heat) if _is_remade(drive, track_heat) else None
     check_force(drive.compensated, drive.rate_Hz, device.info.force_limit_N, drive.predicted)
     check_force(drive.scaled, drive.rate_Hz, device.info.force_limit_N)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
@@ -150,7 +149,7 @@ def play(
             dropped += once.dropped_samples
             fault, remedy = once.fault, once.remedy
             if tracked is not None:
-                tracked.take(drive.time_s, once)
+                tracked.take(once.rows, once.duty)
             if fault:
                 break
             kept[name].append(once.rows)
@@ -178,37 +177,6 @@ def play(
     )
     raise_if_stopped(fault, remedy, "the playback", playback if whole else None)
     return playback
-
-
-class _Tracked:
-    """A play whose heat is tracked."""
-
-    def __init__(self, drive: Waveform, model: Model, thermometer: Thermometer) -> None:
-        self._correction, self._thermometer = Correction(drive, model), thermometer
-        self.temperatures: list[float] = []  # at each compensated drive, K
-
-    @classmethod
-    def of(cls, drive: Waveform, device: Device, asked: bool | None) -> _Tracked | None:
-        if not _is_remade(drive, asked):
-            return None
-        model = drive.model
-        thermometer = thermometer_of(model, device, asked=asked)
-        if thermometer is None or model is None:
-            return None
-        return cls(drive, model, thermometer)
-
-    def current(self) -> FloatArray:
-        """The compensated drive for the heat of now."""
-        self._thermometer.restart()
-        self.temperatures.append(self._thermometer.temperature_K)
-        return self._correction.current(self._thermometer.extra)
-
-    def take(self, time_s: FloatArray, once: Once) -> None:
-        """Take in what a play brought back."""
-        self._thermometer.restart()
-        there = np.isfinite(once.duty)
-        reference, current, _ = once.rows
-        self._thermometer.add(time_s[there], reference[there], current[there], once.duty[there])
 
 
 def _is_remade(drive: Waveform, asked: bool | None) -> bool:

@@ -91,9 +91,7 @@ class Programme:
         changes: Sequence[Change] = (),
     ) -> None:
         _check_length(minutes, beats)
-        check_rate(rate)
-        check_amplitude(amplitude)
-        for change in changes:
+        for change in (Change(0.0, rate, amplitude), *changes):
             check_rate(change.rate)
             check_amplitude(change.amplitude)
         self.names = tuple(pulses)
@@ -127,9 +125,6 @@ class Programme:
         for change, pulse in self._changes:
             if change.time_s > time_s:
                 break
-            play = Play(
-                play.pulse if pulse is None else pulse,
-                play.amplitude if change.amplitude is None else change.amplitude / 100.0,
-                play.bpm if change.rate is None else change.rate,
-            )
+            amplitude = None if change.amplitude is None else change.amplitude / 100.0
+            play = play.changed(pulse, amplitude, change.rate)
         return play

@@ -62,22 +62,13 @@ class Blind:
         self._answers: list[tuple[str, float]] = []
         self._begun: list[float] = []
         self._first: int  # number of the first beat of the question, once it has begun
-        self._waits = False
+        self.questions = len(self._asked)
+        self.waits = False  # the beats of a question are over, and its answer is still to come
 
     @property
     def question(self) -> int:
         """Number of the question, from 0; as many as there are when all are answered."""
         return len(self._answers)
-
-    @property
-    def questions(self) -> int:
-        """How many there are."""
-        return len(self._asked)
-
-    @property
-    def waits(self) -> bool:
-        """Whether the beats of a question are over, and its answer is still to come."""
-        return self._waits
 
     def share_at(self, _time_s: float) -> float:
         """How much of it is over: an answer may take any time."""
@@ -87,7 +78,7 @@ class Blind:
         """Return what is played next."""
         at = self.question
         if len(self._begun) == at:  # not yet begun
-            if at == len(self._asked):
+            if at == self.questions:
                 return None
             self._begun.append(time_s)
             self._first = number
@@ -95,12 +86,12 @@ class Blind:
             self._begun[at] = time_s
         cut_s = self._begun[at] + QUESTION_S
         if time_s < cut_s - _ROUNDING_S:
-            self._waits = False
+            self.waits = False
             return Play(self._asked[at], self._play.amplitude, self._play.bpm, cut_s)
         said = self._answer(at) if time_s >= cut_s + GAP_S - _ROUNDING_S else None
         if said is not None:
             self._answers.append(said)
-        self._waits = said is None
+        self.waits = said is None
         return Rest()
 
     def told(self, beats: Beats) -> Beats:

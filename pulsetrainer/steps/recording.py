@@ -56,10 +56,8 @@ class Sink(Protocol):
     def end_s(self) -> float:
         """Time of the last sample."""
 
-    def append(
-        self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray, /
-    ) -> None:
-        """Take samples in, arrays (n,) in s, A, A and N."""
+    def append(self, *columns: FloatArray) -> None:
+        """Take in time, reference, current and force, (n,) in s, A, A and N."""
 
     def begin_part(self) -> None:
         """Say that the device was off since the last sample."""
@@ -83,12 +81,10 @@ class InMemory:
         """Time of the last sample."""
         return float(self._blocks[-1][0, -1])
 
-    def append(
-        self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray, /
-    ) -> None:
-        """Take samples in, arrays (n,) in s, A, A and N."""
-        if np.size(time_s):
-            self._blocks.append(np.stack((time_s, reference_A, current_A, force_N)))
+    def append(self, *columns: FloatArray) -> None:
+        """Take in time, reference, current and force, (n,) in s, A, A and N."""
+        if np.size(columns[0]):
+            self._blocks.append(np.stack(columns))
 
     def begin_part(self) -> None:
         """Say that the device was off since the last sample."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.steps.conductor import Decide, Decision, Play, Rest
@@ -58,7 +58,7 @@ class Steering:
             self._pauses[-1] = (begun_s, time_s)
         decided = self.programme(number, self.without_pauses(time_s))
         if isinstance(decided, Play):
-            decided = self._played = self._changed(decided)
+            decided = self._played = decided.changed(self.pulse, self.amplitude, self.rate)
         return decided
 
     @property
@@ -71,14 +71,6 @@ class Steering:
             return "stopped by key before its end"
         left = quiz.question < quiz.questions
         return f"stopped by key in question {quiz.question + 1} of {quiz.questions}" * left
-
-    def _changed(self, play: Play) -> Play:
-        return replace(
-            play,
-            pulse=play.pulse if self.pulse is None else self.pulse,
-            amplitude=play.amplitude if self.amplitude is None else self.amplitude,
-            bpm=play.bpm if self.rate is None else self.rate,
-        )
 
     def without_pauses(self, time_s: float) -> float:
         """Return how much of a time, s, was no pause."""
@@ -107,7 +99,7 @@ class Steering:
             self.stopped = True
         else:
             said = f"{key!r} is not one of the keys"
-        self._played = self._changed(self._played)
+        self._played = self._played.changed(self.pulse, self.amplitude, self.rate)
         return said
 
 

@@ -6,9 +6,8 @@ from typing import Any
 
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.device.follower import INTERRUPTED
+from pulsetrainer.device.wording import UNKNOWN_REMEDY
 from pulsetrainer.errors import DeviceError, Interrupted
-
-UNKNOWN_REMEDY = "remove the cause; the next command clears the fault"
 
 
 def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> None:

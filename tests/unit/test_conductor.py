@@ -278,7 +278,7 @@ def test_the_ledger_finds_what_was_done_to_a_force():
     """A force that is late, weak and noisy by known amounts is told so, sample by sample counted."""
     static = pt.load(KEPT / "model.h5")
     _, given, _ = _conducted(static, Programme(NAMES, rate=75.0, beats=60))
-    ledger = Ledger(NAMES)
+    ledger = Ledger()
     rng = np.random.default_rng(4)
     target = np.concatenate([g.target for g in given])
     time = np.arange(target.size)
@@ -311,7 +311,7 @@ def test_a_beat_that_was_cut_has_no_height_and_no_time():
         return None if number > 9 else Play(0, 1.0, 75.0, time_s + 0.016 if number == 5 else np.inf)
 
     _, given, _ = _conducted(pt.load(KEPT / "model.h5"), decide)
-    ledger = Ledger(NAMES[:1])
+    ledger = Ledger()
     for piece in given:
         ledger.give(piece)
     target = np.concatenate([g.target for g in given])
@@ -332,7 +332,7 @@ def test_figures_of_a_session_are_what_they_are_called():
         return None if time_s > 12.0 else Rest() if 5.0 < time_s < 6.5 else Play(0)
 
     _, given, _ = _conducted(pt.load(KEPT / "model.h5"), decide)
-    ledger = Ledger(NAMES[:1])
+    ledger = Ledger()
     target = np.concatenate([g.target for g in given])
     force, time, rested = target.copy(), np.arange(target.size), False
     for number, piece in enumerate(given):
@@ -362,7 +362,7 @@ def test_figures_of_a_session_are_what_they_are_called():
 def test_a_beat_after_which_nothing_is_given_out_yet_is_no_rest():
     """As on a busy computer: "at rest" was shown between two beats, and taken for the pause."""
     _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
-    ledger = Ledger(NAMES[:1])
+    ledger = Ledger()
     assert ledger.under_way is None
     for piece in given:
         ledger.give(piece)
@@ -375,7 +375,7 @@ def test_lost_samples_are_left_out():
     """A beat with a gap is judged on what came; one with little left is not judged."""
     static = pt.load(KEPT / "model.h5")
     _, given, _ = _conducted(static, Programme(NAMES[:1], beats=6))
-    ledger = Ledger(NAMES[:1])
+    ledger = Ledger()
     for piece in given:
         ledger.give(piece)
     target = np.concatenate([g.target for g in given])
@@ -392,7 +392,7 @@ def test_lost_samples_are_left_out():
 def test_beats_that_were_lost_as_a_whole_have_no_figures():
     """Not even a full force."""
     _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
-    ledger = Ledger(NAMES[:1])
+    ledger = Ledger()
     for piece in given:
         ledger.give(piece)
     ledger.measure(np.asarray([given[-1].first]), np.zeros(1))

@@ -1162,9 +1162,9 @@ def test_the_range_of_a_dual_model_is_where_inputs_went_within_it(monkeypatch, f
     monkeypatch.setattr(question, "input_range", lambda model: (0.0, 10.0))
     model = SimpleNamespace(form=form, fit=SimpleNamespace(input=np.asarray([0.5, 9.0])))
     runs = [SimpleNamespace(input=np.asarray([0.2, np.nan, 8.0])), SimpleNamespace(input=np.asarray([9.5]))]
-    assert question._range_of(model, runs) == expected
+    assert question.range_of(model, runs) == expected
     beyond = [SimpleNamespace(input=np.asarray([-1.0, 11.0]))]
-    assert question._range_of(model, beyond) == (0.0, 10.0)
+    assert question.range_of(model, beyond) == (0.0, 10.0)
 
 
 def test_the_records_of_a_question_are_called_as_the_runs_were_named():

@@ -68,7 +68,8 @@ def test_the_same_file_as_the_store_writes(tmp_path):
     with RunRecorder(tmp_path / "recorder.h5", examples.header(), signal="identification") as recorder:
         _record(recorder, run)
         assert recorder.samples == 100
-        assert recorder.finish(dropped_samples=2) == tmp_path / "recorder.h5"
+        recorder.dropped_samples = 2
+        assert recorder.finish() == tmp_path / "recorder.h5"
     assert _tree(tmp_path / "recorder.h5") == _tree(tmp_path / "store.h5")
     assert examples.equal(read(tmp_path / "recorder.h5", Run), run)
     assert read_header(tmp_path / "recorder.h5") == examples.header()

@@ -13,6 +13,7 @@ from core_jobs import curves
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Playback, Run
+from pulsetrainer.core.initial_state import left_out_words
 from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
@@ -228,6 +229,38 @@ def test_the_state_before_a_record_is_the_one_that_was_predicted_from():
         "positive saturation, estimated",
         "negative saturation, as for every extended model",
     ]
+
+
+LAGGING = replace(MODEL, extensions=(Extension("output-lag", (Parameter("tau", 0.03, 0.03, 0.03, "s"),)),))
+LOOPS = np.interp(np.arange(1350), np.cumsum([0, *[200] * 4, *[80] * 4, *[40] * 6]), np.arange(15) % 2)
+ONCE = np.interp(np.arange(2500), [0, 500, 1000, 1500, 2000, 2500], [0, 1, 0.3, 0.8, 0.2, 0.9])
+
+
+def _first_apart(u, until, size):
+    """What the first stroke of a device that was never cycled adds to its later ones."""
+    return size * np.clip(1.0 - np.arange(u.size) / until, 0.0, None)
+
+
+def test_a_first_stroke_that_a_lag_hides_is_left_out_of_all_models():
+    """By the lag strokes differ at other rates, too; less what it adds, only the first does."""
+    y = LAGGING.predict(LOOPS, dt_s=1e-3) + _first_apart(LOOPS, 150, 0.1)
+    run = Run(np.arange(y.size) / 1000.0, LOOPS, y)
+    alone = evaluate(run, MODEL)
+    both = evaluate(run, [MODEL, LAGGING], names=["a"])
+    assert not alone.notes
+    assert both.notes == (f"a: {left_out_words(199)}",)
+    assert both.models[0].output.size == both.models[1].output.size == LOOPS.size - 199
+    assert both.models[1].rms_percent < 1e-6 < both.models[0].rms_percent
+
+
+@pytest.mark.parametrize(
+    ("size", "model", "counted"), [(2.0, LAGGING, 2004), (0.0, LAGGING, 2500), (0.0, MODEL, 2500)]
+)
+def test_the_only_first_stroke_is_left_out_where_every_model_misses_it(size, model, counted):
+    """No later stroke is there to compare it with; a model that alone is wrong there still counts it."""
+    y = LAGGING.predict(ONCE, dt_s=1e-3) + _first_apart(ONCE, 400, size)
+    found = evaluate(Run(np.arange(y.size) / 1000.0, ONCE, y), [MODEL, model])
+    assert {one.output.size for one in found.models} == {counted}
 
 
 def test_samples_outside_the_model_are_counted():
