@@ -11,7 +11,6 @@ from pulsetrainer.diagnosis import (
     congruency,
     fitting,
     held_out,
-    intervals,
     procedure,
     screening,
     thresholds,
@@ -45,7 +44,7 @@ Beside those of the [vocabulary](vocabulary.md) these words are used throughout:
 - **device of another kind**: one that is no Preisach operator. Some were simulated to set the numbers.
 - **decision**: a page in [decisions](decisions/README.md) that says why.
 """
-METHODS = (screening, fitting, held_out, congruency, intervals)
+METHODS = (screening, fitting, held_out, congruency)
 # name = value  # what it guards
 _LINE = re.compile(r"^ *(?P<name>\w+)(?:: [\w\[\], .]+)? = (?P<value>.+?)  # (?P<why>.+)$")
 _SECTION = re.compile(r"^    # (?P<title>.+)$")

@@ -29,7 +29,9 @@ from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Trace
 from pulsetrainer.device.wording import UNKNOWN_REMEDY
-from pulsetrainer.diagnosis import gates, wording
+from pulsetrainer.diagnosis import wording
+from pulsetrainer.diagnosis.causes import fired_on
+from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
 from pulsetrainer.steps.stopped import raise_if_stopped
@@ -248,7 +250,7 @@ def _noise(name: str, still: FloatArray, full: float, of: str, unit: str, fix: s
 def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     """Saturation, tracking and what else the raw data show by themselves."""
     measured = Record(recording.current_A, recording.force_N, dt_s=_GRID_S, reference=recording.reference_A)
-    fired = {one.cause: one for one in gates.check(measured, 0.0, top) if one.cause != "out-of-range"}
+    fired = {one.cause: one for one in fired_on(Raw(measured, 0.0, top)) if one.cause != "out-of-range"}
     if cut := fired.pop("saturation", None):
         fix = "lower the gain of the force amplifier"
         yield _finding("saturation", wording.text(cut.evidence), problem=fix)

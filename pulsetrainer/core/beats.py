@@ -67,10 +67,7 @@ class Beats:
             ends = np.append(beat.time_s / length, 1.0)
             total += np.interp(phase, ends, np.append(beat.value, beat.value[0]))
         return replace(
-            self.record,
-            name=f"{self.record.name}_mean",
-            time_s=phase * period,
-            value=total / self.count,
+            self.record, name=f"{self.record.name}_mean", time_s=phase * period, value=total / self.count
         )
 
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import turning_points
-from pulsetrainer.core.plane import FloatArray, Plane, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 _LITTLE = 0.1  # of the cells
@@ -64,7 +64,7 @@ def covers_range(inputs: Sequence[FloatArray], low: float, high: float) -> bool:
     return lowest <= low + slack and highest >= high - slack
 
 
-def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
+def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> BoolArray:
     """Tell for every cell (n_q,) whether some input switched it on and, later, off.
 
     Cell (i, j) is switched on at the first input >= the middle of band i, and off when the input
@@ -111,7 +111,7 @@ def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike], noise: float = 0.0
     return float(np.mean(passed[i, j][within])) if within.any() else 0.0
 
 
-def _mark_corners(plane: Plane, turns: FloatArray, noise: float, passed: NDArray[np.bool_]) -> None:
+def _mark_corners(plane: Plane, turns: FloatArray, noise: float, passed: BoolArray) -> None:
     """Mark the cells (n_h, n_h) that corners of the memory pass, rising first, from negative saturation."""
     inwards = min(noise, 0.5 * float(np.diff(plane.edges).min())) * np.where(np.arange(turns.size) % 2, 1, -1)
     bands = np.searchsorted(plane.edges[1:-1], turns + inwards, side="right").tolist()
@@ -136,7 +136,7 @@ def _mark_corners(plane: Plane, turns: FloatArray, noise: float, passed: NDArray
         at = one[1]
 
 
-def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
+def largest_gap(plane: Plane, covered: BoolArray) -> Gap | None:
     """Return the largest rectangle, cut by the diagonal, of cells that are not ``covered`` (n_q,).
 
     Every rectangle of bands is tried whose cells below the diagonal are all uncovered; the one of the

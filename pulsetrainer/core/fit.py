@@ -21,7 +21,7 @@ from pulsetrainer.core.forms import BETTER, Form, Kept, Signals, Static, asked_f
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, counted_output
 
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
 
@@ -58,7 +58,7 @@ class Fitted:
     @property
     def counted_output(self) -> FloatArray:
         """Measured outputs (k,) of all records that count in the fit."""
-        return np.concatenate(self.counted([r.output for r in self.records]))
+        return counted_output(self.records)
 
     @property
     def misfit(self) -> float:

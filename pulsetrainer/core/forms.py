@@ -32,7 +32,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
-from pulsetrainer.core.record import Record, levelled
+from pulsetrainer.core.record import Record, counted_output, levelled
 from pulsetrainer.core.smoothing import FOLDS, blocks, smoothed
 from pulsetrainer.errors import ArgumentError
 
@@ -67,13 +67,7 @@ class Tried:
 
 
 def asked_forms(
-    form: Form | Literal["auto"],
-    signals: Signals,
-    low: float,
-    high: float,
-    kept: Kept = None,
-    *,
-    plain: bool,
+    form: Form | Literal["auto"], signals: Signals, low: float, high: float, kept: Kept = None, *, plain: bool
 ) -> tuple[Form, ...]:
     """Return the form to fit: the one asked for, or with "auto" the one that the records ask for.
 
@@ -114,7 +108,7 @@ def try_all(signals: Signals, low: float, high: float, kept: Kept = None) -> Tri
     if len({number for fold in folds for number in np.unique(fold).tolist()} - {-1}) < 2:
         return Tried({}, "direct", ("direct",))  # nothing can be held out
     direct, signed = (_HeldOut(records, folds, plane, signed=either) for either in (False, True))
-    span = float(np.ptp(np.concatenate([r.output[r.counts] for r in records])))
+    span = float(np.ptp(counted_output(records)))
     left: dict[Form, float] = {"direct": direct(_FIRST), "signed": signed(_FIRST)}
     # the dual form too is rarely much worse as a signed one than by itself
     if left["direct"] < SMALLEST * span or left["signed"] > LOOK * left["direct"]:

@@ -15,16 +15,15 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pulsetrainer.core import large, nnls
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.core.record import Record, levelled
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
+from pulsetrainer.core.record import Record, counted_output, levelled
 from pulsetrainer.core.smoothing import LEAST_SIGNED, Choice, choose, smoothed
-from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
+from pulsetrainer.core.stiffness import choose_stiffness, penalised
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 Method = Literal["joint", "alternating"]
@@ -65,7 +64,7 @@ class Identified:
 def correlation_of(records: Sequence[Record]) -> float:
     """Return the correlation of input and output, -1..1; 0 where one of them does not vary."""
     u = np.concatenate([r.input[r.counts] for r in records])
-    y = np.concatenate([r.output[r.counts] for r in records])
+    y = counted_output(records)
     # both scaled to 1 first: the product of two small numbers must not underflow
     u, y = (
         x / max(float(np.abs(x).max(initial=0.0)), np.finfo(float).tiny) for x in (u - u.mean(), y - y.mean())
@@ -138,7 +137,7 @@ def identify(
     else:
         equations = normal_equations(plane, turned, reading)
         masses, offset, iterations, kkt = _fit_dense(equations, method, length, 0.0)
-        if choice.tried and equations.rms(masses, offset) > _POOR * _span(turned):
+        if choice.tried and equations.rms(masses, offset) > _POOR * float(np.ptp(counted_output(turned))):
             stiffness = choose_stiffness(turned, plane, reading)
         if stiffness:
             length = 0.0  # a density that is alike along the diagonal needs no other smoothing
@@ -186,7 +185,7 @@ def _kept_in_range(
     gram, rhs = smoothed(equations, smoothing)
     diagonal = gram.diagonal().copy()
     size = float(diagonal.mean())
-    measured = np.concatenate([r.output[r.counts] for r in records])
+    measured = counted_output(records)
     beyond = _BEYOND * float(np.ptp(measured))
     for ridge in (0.0, *_RIDGES):
         np.fill_diagonal(gram, diagonal + ridge * size)
@@ -196,11 +195,6 @@ def _kept_in_range(
         if lowest >= measured.min() - beyond and highest <= measured.max() + beyond:
             break
     return operator, ridge
-
-
-def _span(records: Sequence[Record]) -> float:
-    """Span of the output over all samples that count."""
-    return float(np.ptp(np.concatenate([r.output[r.counts] for r in records])))
 
 
 def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = "continuous") -> FloatArray:
@@ -254,8 +248,7 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
             f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
         )
     inputs = np.concatenate([np.clip(r.input, plane.low, plane.high) for r in records])
-    outputs = np.concatenate([r.output[r.counts] for r in records])
-    for name, values in (("input", inputs), ("output", outputs)):
+    for name, values in (("input", inputs), ("output", counted_output(records))):
         if np.ptp(values) <= 1e-12 * np.abs(values).max():
             raise ArgumentError(
                 f"the {name} does not vary: it is {values[0]:g} in all of its {values.size} samples "
@@ -271,20 +264,6 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
 
 
 _Fitted = tuple[FloatArray, float, int, float]  # masses, offset, iterations, relative KKT violation
-
-
-def penalised(
-    equations: NormalEquations, smoothing: float, stiffness: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return the centred Gram matrix (n_q, n_q) and right side (n_q,) with the penalties of a fit.
-
-    See ``core.smoothing`` for the length, ``core.stiffness`` for the stiffness; 0 is none of either.
-    """
-    gram, rhs = smoothed(equations, smoothing)
-    if stiffness:
-        centred = equations.centred()[0]
-        gram += stiffness_penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
-    return gram, rhs
 
 
 def _fit_dense(equations: NormalEquations, method: Method, smoothing: float, stiffness: float) -> _Fitted:
@@ -322,7 +301,7 @@ def _alternate(
     """
     offset = equations.output_sum / equations.weight_sum
     spread = np.sqrt(max(equations.output_square / equations.weight_sum - offset**2, 0.0))
-    passive: NDArray[np.bool_] | None = None
+    passive: BoolArray | None = None
     before: tuple[float, float] | None = None
     for iteration in range(1, limit + 1):
         found = nnls.solve(gram, equations.moment - offset * equations.row_sum, passive=passive)

@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.record import Record
 
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
@@ -190,7 +189,7 @@ def _side_by_side(strokes: Sequence[tuple[FloatArray, FloatArray]], reach: float
     return np.stack([np.interp(places, way, y) for way, y in strokes])
 
 
-def _at_end(away: FloatArray, near: float) -> NDArray[np.bool_]:
+def _at_end(away: FloatArray, near: float) -> BoolArray:
     """Whether an input so far ``away`` (n,) from an end has come ``near`` it, and not left it since."""
     told = np.flatnonzero((away <= near) | (away > _LEFT * near))
     last = np.maximum(np.searchsorted(told, np.arange(away.size), side="right") - 1, 0)

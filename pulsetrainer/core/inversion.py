@@ -17,11 +17,11 @@ from itertools import pairwise
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import State, Trace, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, IntArray, ascending, finite_vector, positive
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
 
@@ -50,7 +50,7 @@ class _Branches:
                 row[k:] = np.maximum.accumulate(row[k:])
                 row[k::-1] = np.maximum.accumulate(row[k::-1])
 
-    def reach(self, origin: FloatArray, need: FloatArray, rising: NDArray[np.bool_]) -> FloatArray:
+    def reach(self, origin: FloatArray, need: FloatArray, rising: BoolArray) -> FloatArray:
         """Inputs (n,) at which branches from ``origin`` have moved by ``need``; where flat, the nearest."""
         edges, n_h = self.plane.edges, self.plane.n_h
         k, t = self.plane.bands(origin)

@@ -21,11 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 from pulsetrainer.core.smoothing import penalty
 from pulsetrainer.errors import ConvergenceError
 
@@ -91,7 +90,7 @@ def solve(sums: NodeSums, smoothing: float = 0.0, *, max_iterations: int = 60) -
 
 def _newton(
     system: _System,
-    usable: NDArray[np.bool_],
+    usable: BoolArray,
     m: FloatArray,
     lam: FloatArray,
     dual: FloatArray,

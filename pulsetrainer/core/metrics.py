@@ -1,7 +1,8 @@
-"""Figures of merit: tracking errors, prediction errors, loop areas."""
+"""Figures of merit: tracking and prediction errors, loop areas; how long a residual remembers itself."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +56,29 @@ def root_mean_square(values: FloatArray) -> float:
     """Root of the mean of the squares of all ``values`` (...), in their unit; infinite beyond 1e154."""
     with np.errstate(over="ignore"):
         return float(np.sqrt(np.mean(values**2)))
+
+
+def correlation_time(residuals: Sequence[FloatArray]) -> float:
+    """Return tau = 1 + 2 sum_k rho_k, samples, up to the first autocorrelation rho_k below 2 / sqrt(n).
+
+    White residuals have 1. Several residuals (n,) are taken together, each about its own mean; lags beyond
+    a tenth of all samples are not looked at. A residual that is zero has 1.
+    """
+    n = sum(r.size for r in residuals)
+    lags = max(1, n // 10)
+    power = np.zeros(lags)
+    for residual in residuals:
+        if residual.size == 0:
+            continue
+        e = residual - residual.mean()
+        spectrum = np.fft.rfft(e, 2 * e.size)
+        own = np.fft.irfft(np.abs(spectrum) ** 2)[: min(lags, e.size)]
+        power[: own.size] += own
+    if power[0] <= 0:
+        return 1.0
+    correlation = power / power[0]
+    end = int(np.argmax(np.append(correlation, 0.0) < 2.0 / np.sqrt(n)))
+    return 1.0 + 2.0 * float(correlation[1:end].sum())
 
 
 def loop_area(x: ArrayLike, y: ArrayLike) -> float:

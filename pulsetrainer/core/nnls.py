@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, finite_vector
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 # A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
@@ -39,16 +38,12 @@ class NonNegative(NamedTuple):
     """The minimiser, where it is positive, and how many systems were solved."""
 
     x: FloatArray  # (q,)
-    passive: NDArray[np.bool_]  # (q,) True where x may be positive
+    passive: BoolArray  # (q,) True where x may be positive
     iterations: int
 
 
 def solve(
-    gram: FloatArray,
-    rhs: FloatArray,
-    *,
-    passive: NDArray[np.bool_] | None = None,
-    max_iterations: int = _SYSTEMS,
+    gram: FloatArray, rhs: FloatArray, *, passive: BoolArray | None = None, max_iterations: int = _SYSTEMS
 ) -> NonNegative:
     """Return the non-negative minimiser of x' G x / 2 - f' x for G = ``gram`` (q, q) and f = ``rhs`` (q,).
 
@@ -73,12 +68,8 @@ class Gram:
     """A matrix G (q, q) for many right sides; the factor of the last set of positive variables is kept."""
 
     def __init__(self, matrix: FloatArray) -> None:
-        q = len(matrix)
-        if matrix.shape != (q, q) or not np.all(np.isfinite(matrix)):
-            raise ArgumentError(
-                f"gram must be finite, of shape {(q, q)} like rhs, got {matrix.shape}",
-                hint="sum gram and rhs over the same finite samples",
-            )
+        if matrix.shape != (len(matrix), len(matrix)) or not np.all(np.isfinite(matrix)):
+            raise _unfit(matrix, len(matrix))
         self.matrix, self.size = matrix, np.abs(matrix)
         diagonal = np.diagonal(matrix)
         self.scale = float(diagonal.max(initial=0.0))
@@ -86,22 +77,19 @@ class Gram:
         self._factored: tuple[IntArray, Factor] | None = None
 
     def solve(
-        self, rhs: FloatArray, *, passive: NDArray[np.bool_] | None = None, max_iterations: int = _SYSTEMS
+        self, rhs: FloatArray, *, passive: BoolArray | None = None, max_iterations: int = _SYSTEMS
     ) -> NonNegative:
         """Return the non-negative minimiser: see ``solve``."""
         rhs = finite_vector("rhs", rhs)
         if self.matrix.shape != (rhs.size, rhs.size):
-            raise ArgumentError(
-                f"gram must be finite, of shape {(rhs.size, rhs.size)} like rhs, got {self.matrix.shape}",
-                hint="sum gram and rhs over the same finite samples",
-            )
+            raise _unfit(self.matrix, rhs.size)
         if passive is not None and passive.shape != rhs.shape:
             raise ArgumentError(
                 f"passive must have shape {rhs.shape}, got {passive.shape}",
                 hint="one guess for each variable",
             )
         try:
-            return _exchange(_Problem(self, rhs), passive, max_iterations)
+            return _exchange(self, rhs, passive, max_iterations)
         except ConvergenceError:
             pass
         try:
@@ -110,7 +98,7 @@ class Gram:
             # a record of one branch only: no cell is better than its neighbours
             ridge = _LAST_RIDGE * self.scale
             raised = Gram(self.matrix + ridge * np.diag(self.usable))
-            return _exchange(_Problem(raised, rhs), passive, max_iterations)
+            return _exchange(raised, rhs, passive, max_iterations)
 
     def _active_set(self, rhs: FloatArray, used: int) -> NonNegative:
         """Minimise |A x - b|^2 / 2 with A'A = G and A'b = f, A from the eigenvectors of G (rank, q)."""
@@ -122,7 +110,7 @@ class Gram:
         x[self.usable], _ = scipy.optimize.nnls(root[:, None] * vector, b, maxiter=_ACTIVE_SETS * rhs.size)
         return NonNegative(x, x > 0, used)
 
-    def minimise(self, rhs: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
+    def minimise(self, rhs: FloatArray, free: BoolArray) -> FloatArray:
         """Minimiser (q,) over the free variables (q,), of either sign, the others zero."""
         x = np.zeros(rhs.size)
         index = np.flatnonzero(free)
@@ -130,12 +118,29 @@ class Gram:
             x[index] = scipy.linalg.cho_solve(self._factor(index), rhs[index], check_finite=False)
         return x
 
+    def descends(self, x: FloatArray, rhs: FloatArray) -> BoolArray:
+        """Where the gradient (q,) is negative by more than the rounding of the sums it came from."""
+        return self.matrix @ x - rhs < -_ROUNDING * (self.size @ np.abs(x) + np.abs(rhs))
+
+    def is_lower(self, there: FloatArray, here: FloatArray, rhs: FloatArray) -> bool:
+        """Whether the quadratic is lower there than here; not as a difference of two large numbers."""
+        step = there - here
+        change = float(step @ (self.matrix @ here - rhs + 0.5 * (self.matrix @ step)))
+        return change < -_ROUNDING * float(np.abs(rhs) @ here)
+
     def _factor(self, index: IntArray) -> Factor:
         if self._factored is None or not np.array_equal(self._factored[0], index):
             # cells the data cannot tell apart share their mass
             ridge = np.full(index.size, _RELATIVE_RIDGE * self.scale)
             self._factored = index, factor_of(self.matrix[np.ix_(index, index)], ridge)
         return self._factored[1]
+
+
+def _unfit(matrix: FloatArray, size: int) -> ArgumentError:
+    return ArgumentError(
+        f"gram must be finite, of shape {(size, size)} like rhs, got {matrix.shape}",
+        hint="sum gram and rhs over the same finite samples",
+    )
 
 
 def factor_of(matrix: FloatArray, ridge: FloatArray) -> Factor:
@@ -153,14 +158,14 @@ def factor_of(matrix: FloatArray, ridge: FloatArray) -> Factor:
             ridge = 10.0 * ridge
 
 
-def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iterations: int) -> NonNegative:
+def _exchange(gram: Gram, rhs: FloatArray, passive: BoolArray | None, max_iterations: int) -> NonNegative:
     """Exchange all variables on the wrong side at once, until there are none."""
-    q = problem.rhs.size
-    free = np.zeros(q, dtype=bool) if passive is None else passive & problem.usable
+    q = rhs.size
+    free = np.zeros(q, dtype=bool) if passive is None else passive & gram.usable
     fewest, patience = q + 1, _PATIENCE
     for iteration in range(1, max_iterations + 1):
-        x = problem.minimise_over(free)
-        wrong = np.where(free, problem.negative(x), problem.usable & problem.descends(x))
+        x = gram.minimise(rhs, free)
+        wrong = np.where(free, _negative(x), gram.usable & gram.descends(x, rhs))
         count = int(wrong.sum())
         if count == 0:
             return NonNegative(np.maximum(x, 0.0), free, iteration)
@@ -169,60 +174,38 @@ def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iteratio
         elif patience > 0:
             patience -= 1
         else:
-            return _descend(problem, np.maximum(x, 0.0), iteration, max_iterations)
+            return _descend(gram, rhs, np.maximum(x, 0.0), iteration, max_iterations)
         free = free ^ wrong
     raise _unsettled(max_iterations)
 
 
-class _Problem:
-    """The quadratic, with the signs of its variables and gradients judged against rounding."""
-
-    def __init__(self, gram: Gram, rhs: FloatArray) -> None:
-        self.gram, self.rhs, self.usable = gram, rhs, gram.usable
-
-    def minimise_over(self, free: NDArray[np.bool_]) -> FloatArray:
-        return self.gram.minimise(self.rhs, free)
-
-    def gradient(self, x: FloatArray) -> FloatArray:
-        return self.gram.matrix @ x - self.rhs
-
-    def is_lower(self, there: FloatArray, here: FloatArray) -> bool:
-        """Whether the quadratic is lower there than here; not as a difference of two large numbers."""
-        step = there - here
-        change = float(step @ (self.gradient(here) + 0.5 * (self.gram.matrix @ step)))
-        return change < -_ROUNDING * float(np.abs(self.rhs) @ here)
-
-    def negative(self, x: FloatArray) -> NDArray[np.bool_]:
-        return x < -_ROUNDING * np.abs(x).max(initial=0.0)
-
-    def descends(self, x: FloatArray) -> NDArray[np.bool_]:
-        """Where the gradient is negative by more than the rounding of the sums it came from."""
-        return self.gradient(x) < -_ROUNDING * (self.gram.size @ np.abs(x) + np.abs(self.rhs))
+def _negative(x: FloatArray) -> BoolArray:
+    return x < -_ROUNDING * np.abs(x).max(initial=0.0)
 
 
-def _descend(problem: _Problem, x: FloatArray, used: int, max_iterations: int) -> NonNegative:
+def _descend(gram: Gram, rhs: FloatArray, x: FloatArray, used: int, max_iterations: int) -> NonNegative:
     """Newton steps from a feasible ``x`` that never climb, until the optimality conditions hold.
 
     What a step pushes below zero is put to zero where that is lower than ``x``; else the step ends where the
     first variable reaches zero, and that one stays there.
     """
-    free = problem.usable & ((x > 0) | problem.descends(x))
+    free = gram.usable & ((x > 0) | gram.descends(x, rhs))
     gained = True  # since variables were last freed
     for iteration in range(used + 1, max_iterations + 1):
-        newton = problem.minimise_over(free)
-        falling = free & problem.negative(newton)
+        newton = gram.minimise(rhs, free)
+        falling = free & _negative(newton)
         put = np.maximum(newton, 0.0)
-        lower = problem.is_lower(put, x)
+        lower = gram.is_lower(put, x, rhs)
         gained = gained or lower
         if not np.any(falling):
             x = put
-            more = problem.usable & ~free & problem.descends(x)
+            more = gram.usable & ~free & gram.descends(x, rhs)
             if not np.any(more) or not gained:  # what was freed and gained nothing descends by rounding only
                 return NonNegative(x, free, iteration)
             free, gained = free | more, False
         elif lower:
             x = put
-            free = problem.usable & ((x > 0) | problem.descends(x))
+            free = gram.usable & ((x > 0) | gram.descends(x, rhs))
         else:
             share = x[falling] / (x[falling] - newton[falling])
             first = float(share.min())

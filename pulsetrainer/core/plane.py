@@ -161,8 +161,7 @@ class Plane:
         A_k = (L_i+1 - L_i) (L_j+1 - L_j), half of that on the diagonal.
         """
         i, j = self.cell_indices
-        step = np.diff(self.edges)
-        return step[i] * step[j] * np.where(i == j, 0.5, 1.0)
+        return self._steps[i] * self._steps[j] * np.where(i == j, 0.5, 1.0)
 
     @cached_property
     def thresholds(self) -> FloatArray:
@@ -188,8 +187,7 @@ class Plane:
             k = int(np.flatnonzero(bad)[0])
             wanted = "finite" if signed else "finite and not negative"
             raise ArgumentError(
-                f"weights must be {wanted}, got {array[k]:g} in cell {k}",
-                hint="identify the model again",
+                f"weights must be {wanted}, got {array[k]:g} in cell {k}", hint="identify the model again"
             )
         return array
 

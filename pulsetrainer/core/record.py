@@ -78,12 +78,17 @@ class Record:
         return np.where(self.counts, self.output, 0.0)
 
 
+def counted_output(records: Sequence[Record]) -> FloatArray:
+    """Outputs (k,) of all samples that count, one record after another."""
+    return np.concatenate([r.output[r.counts] for r in records])
+
+
 def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], float]:
     """Records whose outputs are ``sign`` y - z, and z, the mean of sign y over all samples that count.
 
     Sums of squares far from zero have no digits left for what the output does: a force of 1000 N that moves
     by 1 mN is fitted as well as one around zero only after its mean is taken off.
     """
-    counted = np.concatenate([r.output[r.counts] for r in records])
+    counted = counted_output(records)
     zero = sign * float(np.mean(counted)) if counted.size else 0.0
     return [replace(r, output=sign * r.output - zero) for r in records], zero

@@ -27,16 +27,15 @@ from operator import add
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NodeSums, NormalEquations, normal_equations, parted_sums
 from pulsetrainer.core.initial_state import near_ends
 from pulsetrainer.core.memory import Trace
+from pulsetrainer.core.metrics import correlation_time
 from pulsetrainer.core.operator import Preisach, follow
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane, Reading
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
@@ -72,7 +71,7 @@ class Choice:
     tried: tuple[tuple[float, float], ...]  # (s, rms error on held-out blocks, output unit), s rising
 
 
-def bending(plane: Plane, usable: NDArray[np.bool_]) -> scipy.sparse.csr_array:
+def bending(plane: Plane, usable: BoolArray) -> scipy.sparse.csr_array:
     """Rows (k, n_q) whose products with the masses, squared and summed, are the bending B.
 
     Rows are second differences over three neighbouring cells of which all are ``usable`` (n_q,): where
@@ -242,7 +241,7 @@ class _HeldOut:
         self.whole = whole.dense()
         gram, _ = self.whole.centred()
         self.unit = penalty(self.whole.plane, np.diagonal(gram).copy(), 1.0).toarray()
-        self.passive: dict[int, NDArray[np.bool_]] = {}
+        self.passive: dict[int, BoolArray] = {}
         self.errors: dict[float, float] = {}
         self.fits: dict[float, dict[int, tuple[FloatArray, float]]] = {}
 

@@ -23,6 +23,7 @@ from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, parted_sums
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record
+from pulsetrainer.core.smoothing import smoothed
 
 STRENGTHS = (0.1, 1.0, 10.0, 100.0)  # 100 is within a few per cent of t -> infinity
 HELD_OUT = 0.5  # of the samples of each record, the last ones
@@ -53,6 +54,20 @@ def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sc
     return (difference.T @ difference) * (strength * float(diagonal.sum()) / plane.n_q)
 
 
+def penalised(
+    equations: NormalEquations, smoothing: float, stiffness: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the centred Gram matrix (n_q, n_q) and right side (n_q,) with the penalties of a fit.
+
+    See ``core.smoothing`` for the length; 0 is none of either.
+    """
+    gram, rhs = smoothed(equations, smoothing)
+    if stiffness:
+        centred = equations.centred()[0]
+        gram += stiffness_penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
+    return gram, rhs
+
+
 def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
     """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``.
 
@@ -75,9 +90,5 @@ def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) 
 
 
 def _error(fitted: NormalEquations, held_out: NormalEquations, strength: float) -> float:
-    gram, rhs = fitted.centred()
-    if strength:
-        gram += stiffness_penalty(fitted.plane, np.diagonal(gram).copy(), strength).toarray()
-    found = nnls.solve(gram, rhs)
-    squares = held_out.sum_of_squares(found.x, fitted.offset(found.x))
-    return float(np.sqrt(max(squares, 0.0) / held_out.weight_sum))
+    masses = nnls.solve(*penalised(fitted, 0.0, strength)).x
+    return held_out.rms(masses, fitted.offset(masses))

@@ -18,16 +18,17 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
-from pulsetrainer.core.identification import Identified, fits_dense, penalised
+from pulsetrainer.core.identification import Identified, fits_dense
 from pulsetrainer.core.memory import State
+from pulsetrainer.core.metrics import correlation_time
 from pulsetrainer.core.operator import Preisach, outputs
-from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.record import Record, levelled
+from pulsetrainer.core.stiffness import penalised
 from pulsetrainer.errors import ArgumentError
 
 # More blocks cost memory and time, and do not change the intervals any more.
@@ -131,7 +132,7 @@ def bootstrap(
         )
     stack = _Stack(parted_sums(plane, turned, operator.reading, parts, count))
     weights, offsets = np.empty((draws, plane.n_q)), np.empty(draws)
-    passive: NDArray[np.bool_] | None = operator.weights > 0
+    passive: BoolArray | None = operator.weights > 0
     for k in range(draws):
         drawn = rng.multinomial(count, np.full(count, 1.0 / count)).astype(np.float64)
         equations = stack.weighted(drawn).dense()

@@ -3,248 +3,155 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from pulsetrainer.artefacts.units import shown, with_seconds, with_unit
 from pulsetrainer.diagnosis import experiment
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.evidence import Evidence, sentences
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.diagnosis.wording import LACKS, figure, joined, listed
 
-AGAIN = (
-    "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
-    "recording.{command}"
-)
-KEEP = "Use the model as it is: nothing that was found calls for another one."
-# of tied causes one of which is the measurement's, another the device's: no record decides, a person may
-KNOWN = (
-    " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
-    "record the same again, and identify the model from that."
-)
-# what can be done about a fault of the measurement, said with advice that does not say so itself
-ALSO = " Before that, take {removed} out of the recording (pulsetrainer correct), and diagnose what is left."
-# ... of tied causes, none of which is the device's; and if its frequency is one of the mains
-WHICHEVER = (
-    "Be it {either}, it does not belong in a model of the device: take {removed} out of the recording "
-    "(pulsetrainer correct), and go on with the corrected one: it is right either way, but for what the "
-    "causes differ by. "
-)
-# ... of tied causes one of which may be the device's
-FIRST = (
-    "Take {removed} out of the recording (pulsetrainer correct), and go on with the corrected one: that much "
-    "is certain. "
-)
-MAINS = "{mains:.4g} Hz is a frequency of the mains, so a hum is likely. "
-# of tied causes, beside a model that was extended by what was found
-EXTENDED = (
-    "Extend the model now (pulsetrainer extend): it then predicts recordings like these better, whether it "
-    "is {either}. "
-)
-# of records without time
-RATE = (
-    "If the samples were taken at a constant rate, no new recording is needed: read the table again with "
-    "pulsetrainer import --rate HZ."
-)
-# of what is found at the fast end of what a record shows
-FASTER = (
-    " A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart). "
-    "To know what it is, record {experiment}{often}{lasting}, if device and recorder can be so fast. Then "
-    "diagnose that recording.{command}"
-)
-_NOTHING_ELSE = ("lacks", "again")  # advice that a faster record takes the place of
-# after what can be done with the records as they are
-LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
+# What is said beside an advice or in its place: of tied causes of which one may be the measurement's (known,
+# first) or all are (whichever), or which the model was extended by; of a fault that can be taken out (also);
+# of records without time (rate); of what is found at the fast end of what a record shows (faster)
+BESIDE = sentences("""\
+again: record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that
+    recording. {command}
+keep: Use the model as it is: nothing that was found calls for another one.
+known: If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up),
+    record the same again, and identify the model from that.
+also: Before that, take {removed} out of the recording (pulsetrainer correct), and diagnose what is left.
+whichever: Be it {either}, it does not belong in a model of the device: take {removed} out of the recording
+    (pulsetrainer correct), and go on with the corrected one: it is right either way, but for what the causes
+    differ by.
+first: Take {removed} out of the recording (pulsetrainer correct), and go on with the corrected one: that much
+    is certain.
+mains: {mains:.4g} Hz is a frequency of the mains, so a hum is likely.
+extended: Extend the model now (pulsetrainer extend): it then predicts recordings like these better, whether
+    it is {either}.
+rate: If the samples were taken at a constant rate, no new recording is needed: read the table again with
+    pulsetrainer import --rate HZ.
+faster: A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart).
+    To know what it is, record {experiment}{often}{lasting}, if device and recorder can be so fast. Then
+    diagnose that recording. {command}
+later: This recording cannot show everything ({lacked}). If that matters to you, {again}
+ours: The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} -o
+    diagnostic-2.h5.
+table: Save it as a table with the columns {columns}, and read that with pulsetrainer import, as you did for
+    the recordings here.
+""")
 ADVICE: Mapping[str, str] = {
-    "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
-    "tied": (
-        "To tell {names} apart, record {experiment}{often}{lasting}. There the two most similar causes "
-        "differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they "
-        "differ by {here:.2g} %. Then diagnose that recording.{command}"
-    ),
-    "tied, no better": (
-        "We know of no kind of recording that would tell {names} apart much better than this one, on which "
-        "they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of "
-        "the same kind would help: four times as long halves the noise."
-    ),
-    "lacks": f"To see what this recording cannot show, {AGAIN}",
-    "unknown": (
-        "No known cause fits. Record the same again and diagnose both together: that shows whether the "
-        "device does the same again, so that a model of this kind cannot follow it, or "
-        "something else acts on it."
-    ),
-    "another kind": (
-        "The device does the same again, so no other recording helps: a model of this kind does not follow "
-        "it further. Use the model if what it leaves does not matter to you, or a model of another kind."
-    ),
-    "something acts": (
-        "Something that is not in these recordings acts on the device or the sensor. Vary one thing at a "
-        "time, such as temperature, load or supply, and record the same again each time. Then keep what "
-        "matters as it is, and identify the model from a recording in which it was."
-    ),
-    "without the fault": (
-        "A fault of the measurement may be hidden in these recordings. Put it right (a sensor that drifts "
-        "must warm up), record the same again and identify a model from that. If it leaves less, the fault "
-        "was there: diagnose these recordings with that model to see how large it was."
-    ),
-    "none": "Nothing was found in this recording beyond what is taken for noise: use the model as it is.",
-    "none, quick": "The quick screen found nothing. The full diagnosis shows smaller effects.",
-    "none, seen": (
-        "Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger "
-        "than the noise. Use the model as it is."
-    ),
-    "none, correct": (
-        "Nothing in this recording calls for another model: {names} can be seen, but no larger than the "
-        "noise. Use the model as it is. To take that out too, go on with pulsetrainer correct."
-    ),
-    "in the model": (
-        "The model as given contains {names} already, and fitted again to these recordings it would be no "
-        "better: use it as it is."
-    ),
-    "none, small": (
-        "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
-        "but it is too small to matter, or does not predict what was left out of the fit. Use the model as "
-        "it is."
-    ),
-    "none, small, quick": (
-        "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
-        "but it is too small to matter."
-    ),
-    "extend, quick": (
-        "Run the full diagnosis, which fits what was found: a quick screen fits nothing that a model could "
-        "be extended by, or that could be taken out of the recording."
-    ),
-    "too noisy": (
-        f"{KEEP} These recordings could not have shown {{names}} as small as {{matters:.2g}} % of the span. "
-        "If that matters to you, record the same for {times:.2g} times as long, or with less noise, and "
-        "diagnose that."
-    ),
-    "far too noisy": (
-        f"{KEEP} These recordings could not have shown {{names}} as small as {{matters:.2g}} % of the span, "
-        "and longer ones would hardly do so. If that matters to you, record with less noise: averaged, with "
-        "a finer sensor, or over a wider range."
-    ),
-    "inconclusive": (
-        f"{KEEP} These recordings could not have shown {{names}} of {{matters:.2g}} % of the span. "
-        f"If that matters to you, {AGAIN}"
-    ),
-    "extend, or late": (
-        "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "
-        "model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which "
-        "takes it out. Then compare both models on another recording, one that was not fitted: pulsetrainer "
-        "evaluate."
-    ),
-    "extend": (
-        "Extend the model with what was found, then compare both models on another recording, one that was "
-        "not fitted: pulsetrainer evaluate. If you have that recording already, give it to extend "
-        "(--verify): only what holds there too is then added."
-    ),
-    "extend, correct": (
-        "Extend the model with what was found, then compare both models on another recording, one that was "
-        "not fitted: pulsetrainer evaluate. From the measurement: {names}; the extended model was fitted "
-        "without that, so nothing has to be corrected first. For a clean recording, there is pulsetrainer "
-        "correct."
-    ),
-    "rest first": (
-        "The device was still settling when these recordings began, or had never been cycled. Cycle it once "
-        "through its whole range, let it rest for {rest} where they begin, then record the same again and "
-        "diagnose that: what was found can then be added to the model. The rest need not be recorded."
-    ),
-    "again": (
-        "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
-        "model. Record the same again, and diagnose both recordings together."
-    ),
-    "correct": (
-        "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
-        "correct). If the model was identified from it, identify it again from the corrected one; a model "
-        "from a sound recording stays as it is."
-    ),
-    "correct, extend": (
-        "The measurement is at fault, and the device does something that the model lacks. First take {names} "
-        "out of the recording (pulsetrainer correct). If the model was identified from it, identify it again "
-        "from the corrected one. Then diagnose the corrected recording, and extend the model."
-    ),
-    "conditions": (
-        "The recordings were made in different conditions, such as load, zero or gain: the evidence says "
-        "which of them the model as given predicts. Put the others right, or identify a model for each "
-        "condition."
-    ),
-    "out of range": (
-        "The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a "
-        "run over the whole range in which it is used, and diagnose with the new model."
-    ),
-    "clipped input": (
-        "The recorder clips the {input} at {rail:.4g}{in_u}: widen its range, or keep the {input} within it, "
-        "and record again. What it did not see cannot be put back (pulsetrainer correct does not try). Until "
-        "then use no model that was identified from such a recording: it is wrong beyond {rail:.4g}{in_u}, "
-        "and after the {input} was there. A model from a sound recording stays as it is."
-    ),
-    "repair": "No model can represent this: put right what was found, and record again.",
-    "other model": (
-        "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
-    ),
-    "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
-    "strokes": (
-        "Record again in the same condition, at least three times between {low} and {high}, then with "
-        "smaller loops that turn at {turns}, and diagnose that."
-    ),
-    "keep steady": (
-        "Something that is not in these recordings changes the device or the measurement slowly. Let device "
-        "and sensor warm up, keep room and supply as they are, look for draughts and loose plugs, and "
-        "record the same again. Diagnose both together: if they differ, it was not the device."
-    ),
-    "identify anew": (
-        "Identify the model again in this condition, from loops of many sizes: a new run, or these "
-        "recordings if they hold such loops. If nothing was changed since, take them together with "
-        "those that the model was identified from. Then diagnose with the new model."
-    ),
-    "warm up": (
-        "Let device and sensor warm up, record the same again, and identify the model from that recording. "
-        "If it then leaves little, something drifted here: go on with the new model. If it leaves as much, "
-        "a Preisach model may not describe this device."
-    ),
+    kind: said.replace("{again}", BESIDE["again"]).replace("{keep}", BESIDE["keep"])
+    for kind, said in sentences("""\
+tied, quick: Run the full diagnosis: a quick screen cannot distinguish between {names}.
+tied: To tell {names} apart, record {experiment}{often}{lasting}. There the two most similar causes differ by
+    {there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ by
+    {here:.2g} %. Then diagnose that recording. {command}
+tied, no better: We know of no kind of recording that would tell {names} apart much better than this one, on
+    which they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of the
+    same kind would help: four times as long halves the noise.
+lacks: To see what this recording cannot show, {again}
+unknown: No known cause fits. Record the same again and diagnose both together: that shows whether the device
+    does the same again, so that a model of this kind cannot follow it, or something else acts on it.
+another kind: The device does the same again, so no other recording helps: a model of this kind does not
+    follow it further. Use the model if what it leaves does not matter to you, or a model of another kind.
+something acts: Something that is not in these recordings acts on the device or the sensor. Vary one thing at
+    a time, such as temperature, load or supply, and record the same again each time. Then keep what matters
+    as it is, and identify the model from a recording in which it was.
+without the fault: A fault of the measurement may be hidden in these recordings. Put it right (a sensor that
+    drifts must warm up), record the same again and identify a model from that. If it leaves less, the fault
+    was there: diagnose these recordings with that model to see how large it was.
+none: Nothing was found in this recording beyond what is taken for noise: use the model as it is.
+none, quick: The quick screen found nothing. The full diagnosis shows smaller effects.
+none, seen: Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger
+    than the noise. Use the model as it is.
+none, correct: Nothing in this recording calls for another model: {names} can be seen, but no larger than the
+    noise. Use the model as it is. To take that out too, go on with pulsetrainer correct.
+in the model: The model as given contains {names} already, and fitted again to these recordings it would be no
+    better: use it as it is.
+none, small: Nothing that matters was found in this recording: noise alone is unlikely to look like {names},
+    but it is too small to matter, or does not predict what was left out of the fit. Use the model as it is.
+none, small, quick: Nothing that matters was found in this recording: noise alone is unlikely to look like
+    {names}, but it is too small to matter.
+extend, quick: Run the full diagnosis, which fits what was found: a quick screen fits nothing that a model
+    could be extended by, or that could be taken out of the recording.
+too noisy: {keep} These recordings could not have shown {names} as small as {matters:.2g} % of the span. If
+    that matters to you, record the same for {times:.2g} times as long, or with less noise, and diagnose that.
+far too noisy: {keep} These recordings could not have shown {names} as small as {matters:.2g} % of the span,
+    and longer ones would hardly do so. If that matters to you, record with less noise: averaged, with a finer
+    sensor, or over a wider range.
+inconclusive: {keep} These recordings could not have shown {names} of {matters:.2g} % of the span. If that
+    matters to you, {again}
+extend, or late: Is the recorder late, or the device? The two look exactly alike. If it is the device, extend
+    the model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which takes
+    it out. Then compare both models on another recording, one that was not fitted: pulsetrainer evaluate.
+extend: Extend the model with what was found, then compare both models on another recording, one that was not
+    fitted: pulsetrainer evaluate. If you have that recording already, give it to extend (--verify): only what
+    holds there too is then added.
+extend, correct: Extend the model with what was found, then compare both models on another recording, one that
+    was not fitted: pulsetrainer evaluate. From the measurement: {names}; the extended model was fitted
+    without that, so nothing has to be corrected first. For a clean recording, there is pulsetrainer correct.
+rest first: The device was still settling when these recordings began, or had never been cycled. Cycle it once
+    through its whole range, let it rest for {rest} where they begin, then record the same again and diagnose
+    that: what was found can then be added to the model. The rest need not be recorded.
+again: What was found is in doubt, or does not repeat within these recordings, so nothing is added to the
+    model. Record the same again, and diagnose both recordings together.
+correct: The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer correct).
+    If the model was identified from it, identify it again from the corrected one; a model from a sound
+    recording stays as it is.
+correct, extend: The measurement is at fault, and the device does something that the model lacks. First take
+    {names} out of the recording (pulsetrainer correct). If the model was identified from it, identify it
+    again from the corrected one. Then diagnose the corrected recording, and extend the model.
+conditions: The recordings were made in different conditions, such as load, zero or gain: the evidence says
+    which of them the model as given predicts. Put the others right, or identify a model for each condition.
+out of range: The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a
+    run over the whole range in which it is used, and diagnose with the new model.
+clipped input: The recorder clips the {input} at {rail:.4g}{in_u}: widen its range, or keep the {input} within
+    it, and record again. What it did not see cannot be put back (pulsetrainer correct does not try). Until
+    then use no model that was identified from such a recording: it is wrong beyond {rail:.4g}{in_u}, and
+    after the {input} was there. A model from a sound recording stays as it is.
+repair: No model can represent this: put right what was found, and record again.
+other model: A Preisach model does not suit this device: take the velocity as the input, or use a damper
+    model.
+other model, both: A Preisach model does not suit this device: use a model of a damper and a spring.
+strokes: Record again in the same condition, at least three times between {low} and {high}, then with smaller
+    loops that turn at {turns}, and diagnose that.
+keep steady: Something that is not in these recordings changes the device or the measurement slowly. Let
+    device and sensor warm up, keep room and supply as they are, look for draughts and loose plugs, and record
+    the same again. Diagnose both together: if they differ, it was not the device.
+identify anew: Identify the model again in this condition, from loops of many sizes: a new run, or these
+    recordings if they hold such loops. If nothing was changed since, take them together with those that the
+    model was identified from. Then diagnose with the new model.
+warm up: Let device and sensor warm up, record the same again, and identify the model from that recording. If
+    it then leaves little, something drifted here: go on with the new model. If it leaves as much, a Preisach
+    model may not describe this device.
+""").items()
 }
+_NOTHING_ELSE = ("lacks", "again")  # advice that a faster record takes the place of
 _TIMES = ("rest", "tau", "apart")  # figures that are times
 _TIED = ("tied", "tied, no better")
 _SAYS_CORRECT = ("correct", "correct, extend", "extend, correct", "extend, or late", "none, correct")
-OURS = (
-    " The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} "
-    "-o diagnostic-2.h5."
-)
-TABLE = (
-    " Save it as a table with the columns {columns}, and read that with pulsetrainer import, as you did "
-    "for the recordings here."
-)
 # What to record instead
-MISSING: Mapping[str, str] = {
-    "rates": "the same loops at {slow}, {middle} and {fast}",
-    "holds": "stops of {hold} at each of {levels}",
-    "length": "{short} or more in all, with loops as fast as these",
-    "time": (
-        "with the time of every sample, the same loops at {slow}, {middle} and {fast}, and stops of {hold} "
-        "at each of {levels}"
-    ),
-}
-EXPERIMENTS: Mapping[str, str] = {
-    "nested loops": (
-        "loops of the {input} between {low} and {high}, ever smaller about {centre} (turning at {turns}), "
-        "once each at {slow}, {middle}, {quick} and {fast}, each begun at {low}"
-    ),
-    "steps and holds": "steps of the {input} at {fast} to {levels}, with a stop of {hold} after each",
-    "equal minor loops": (
-        "loops of the {input} at {pace} that are {width} wide, two each up from {biases}, reached once from "
-        "{low} and once from {high}"
-    ),
-    "equal cycles": (
-        "twenty equal cycles of the {input} between {bottom} and {top} at {middle}, and twenty at {quick}"
-    ),
-    "heating": (
-        "full loops of the {input} at {pace}, one before and one after {heating} at {high}, and one more "
-        "after {heating} at {low}"
-    ),
-}
+MISSING = sentences("""\
+rates: the same loops at {slow}, {middle} and {fast}
+holds: stops of {hold} at each of {levels}
+length: {short} or more in all, with loops as fast as these
+time: with the time of every sample, the same loops at {slow}, {middle} and {fast}, and stops of {hold} at
+    each of {levels}
+""")
+EXPERIMENTS = sentences("""\
+nested loops: loops of the {input} between {low} and {high}, ever smaller about {centre} (turning at {turns}),
+    once each at {slow}, {middle}, {quick} and {fast}, each begun at {low}
+steps and holds: steps of the {input} at {fast} to {levels}, with a stop of {hold} after each
+equal minor loops: loops of the {input} at {pace} that are {width} wide, two each up from {biases}, reached
+    once from {low} and once from {high}
+equal cycles: twenty equal cycles of the {input} between {bottom} and {top} at {middle}, and twenty at {quick}
+heating: full loops of the {input} at {pace}, one before and one after {heating} at {high}, and one more after
+    {heating} at {low}
+""")
 
 
 @dataclass(frozen=True)
@@ -347,16 +254,9 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
     names = one.names[1:] if tied else one.names
     lacked = [name for name in names if name in LACKS]
     faults = [name for name in names if name not in LACKS and library()[name].corrects]
-    if one.kind in _TIED:
-        removable = WHICHEVER if len(faults) == len(names) else FIRST
-        begins = {"extend": EXTENDED, "correct": removable}.get(command, "")
-        told = (MAINS if "mains" in one.figures else "") + begins + ADVICE[one.kind]
-        told += KNOWN if 0 < len(faults) < len(names) else ""
-    else:
-        told = "" if faster_too and one.kind in _NOTHING_ELSE else ADVICE[one.kind]
-        told += ALSO if command == "correct" and one.kind not in _SAYS_CORRECT else ""
-    told = _with_what_lacks(told + FASTER * faster_too, lacked)
-    said = told.format(
+    told = " ".join(_parts(one, command, len(faults), len(names), faster_too=faster_too))
+    told = _with_what_lacks(told, lacked)
+    return told.format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
         lacked=listed(lacked, bench.numbers()),
@@ -367,15 +267,35 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         often=bench.often(played, faster),
         lasting=bench.lasting(played, faster),
         missing="; ".join(MISSING[name].format(**bench.numbers()) for name in names if name in MISSING),
-        command=(OURS if bench.ours else TABLE).format(**numbers),
+        command=BESIDE["ours" if bench.ours else "table"].format(**numbers),
         **{name: bench.time(value) if name in _TIMES else value for name, value in one.figures.items()},
     )
-    return said.lstrip()
+
+
+def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: bool) -> Iterator[str]:
+    """Yield the sentences of an advice, of so many names of which some are faults of the measurement."""
+    if one.kind in _TIED:
+        if "mains" in one.figures:
+            yield BESIDE["mains"]
+        if command == "extend":
+            yield BESIDE["extended"]
+        if command == "correct":
+            yield BESIDE["whichever" if faults == names else "first"]
+        yield ADVICE[one.kind]
+        if 0 < faults < names:
+            yield BESIDE["known"]
+    else:
+        if not (faster_too and one.kind in _NOTHING_ELSE):
+            yield ADVICE[one.kind]
+        if command == "correct" and one.kind not in _SAYS_CORRECT:
+            yield BESIDE["also"]
+    if faster_too:
+        yield BESIDE["faster"]
 
 
 def _with_what_lacks(told: str, lacked: Sequence[str]) -> str:
     """Return advice with what to do about what the records lack, where it does not say so itself."""
-    later = LATER if lacked and "{missing}" not in told else ""
-    if "time" not in lacked:
-        return told + later
-    return f"{told}{later} {RATE}" if later else f"{RATE} {told}"
+    rate = [BESIDE["rate"]] if "time" in lacked else []
+    if lacked and "{missing}" not in told:
+        return " ".join([told, BESIDE["later"].replace("{again}", BESIDE["again"]), *rate])
+    return " ".join([*rate, told])

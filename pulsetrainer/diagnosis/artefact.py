@@ -22,6 +22,7 @@ from pulsetrainer.core.coverage import coverage, covers_range
 from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import counted_output
 from pulsetrainer.diagnosis import advised, residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
@@ -228,8 +229,7 @@ def undone(state: State) -> list[FloatArray]:
 
 def percent_of_samples(state: State) -> float:
     """Return what makes an error of single samples, in the unit of the output, per cent of their span."""
-    outputs = np.concatenate([one.output[one.counts] for one in state.problem.records])
-    return PERCENT / (state.scale.span * float(np.ptp(outputs)))
+    return PERCENT / (state.scale.span * float(np.ptp(counted_output(state.problem.records))))
 
 
 def _noise_of(state: State) -> float:
@@ -340,21 +340,18 @@ def extended_model(state: State, model: Model) -> Model:
     covered = coverage(found.plane, remembered)
     if partial:
         found, covered = completed(found, covered, model, remembered)
-    return Model(
+    return replace(
+        model,
         edges=found.plane.edges,
         weights=found.weights,
         offset=found.offset,
         covered=covered,
-        form=model.form,
-        weights_unit=model.weights_unit,
-        input_unit=model.input_unit,
-        output_unit=model.output_unit,
-        input_quantity=model.input_quantity,
-        output_quantity=model.output_quantity,
-        reading="continuous",
         polarity=found.polarity,
+        weights_lower=None,
+        weights_upper=None,
+        fit=None,
+        coil=None,
         as_measured=True,
-        captured=model.captured,
         extensions=tuple(_extension(state, term, words) for term in lasting),
     )
 

@@ -51,15 +51,8 @@ class Bank:
             for y, frame in zip(simulator.inner(fitted.terms), simulator.frames, strict=True)
         ]
         self.output = fitted.problem.bins.average(self.outputs)  # (count,)
-        own = fitted.projector(fitted.slopes)
-        self.known = scipy.linalg.orth(own) if own.shape[1] else own
+        self.project = fitted.beyond
         self.residual = self.project(fitted.residual[:, None])[:, 0]
-
-    def project(self, columns: FloatArray) -> FloatArray:
-        """Columns (count, k) less what weights and causes in the model can do."""
-        free = self.fitted.projector(columns)
-        free -= self.known @ (self.known.T @ free)
-        return free
 
     def state(self, kind: int, tau: float) -> FloatArray:
         """Averages (count,) of one state."""
@@ -116,13 +109,8 @@ def best_dependence(
     first = int(np.argmax(scores))
     tau, part, own = found[first]
     axes = scipy.linalg.orth(own.astype(np.float64))
-
-    def free_of_both(columns: FloatArray) -> FloatArray:
-        left = bank.project(columns)
-        return np.asarray(left - axes @ (axes.T @ left))
-
     problem = fitted.problem
-    like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
+    like = noise_in(bank.residual, bank.project, axes, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
     best = float(scores[first])

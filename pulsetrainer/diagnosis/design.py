@@ -23,12 +23,11 @@ from functools import cached_property
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.memory import Trace
 from pulsetrainer.core.operator import Preisach, follow, rows
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
 from pulsetrainer.diagnosis.raw import as_fast_as_its_hum, hums
@@ -214,9 +213,7 @@ class Design:
 
     plane: Plane
     bins: Bins
-    nodes: (
-        scipy.sparse.csr_array | FloatArray
-    )  # B (count, n_q) in node space, or B A in cells where causes filter it
+    nodes: scipy.sparse.csr_array | FloatArray  # B (count, n_q) in nodes; B A in cells where causes filter it
     smoothing: float
 
     @classmethod
@@ -273,9 +270,7 @@ class Design:
             return np.asarray(self.nodes.T @ columns)
         return self.plane.adjoint((self.nodes.T @ columns).T).T
 
-    def products(
-        self, own: NDArray[np.bool_], cells: IntArray, beside: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def products(self, own: BoolArray, cells: IntArray, beside: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Products (k, k) and (k, m) of the cells' columns, offset and start not taken off, over some rows.
 
         The first with themselves, the second with columns ``beside`` (own rows, m).
@@ -316,7 +311,7 @@ class Design:
         return np.asarray(penalty(self.plane, np.diagonal(self.squares), self.smoothing).toarray())
 
     def fit(
-        self, y: FloatArray, passive: NDArray[np.bool_] | None = None, *, signed: bool = False
+        self, y: FloatArray, passive: BoolArray | None = None, *, signed: bool = False
     ) -> nnls.NonNegative:
         """Masses for binned outputs (count,), non-negative unless ``signed``."""
         rhs = self.across(self.bins.settled(y))
@@ -334,7 +329,7 @@ class Design:
         """Averaged output (count,) of an operator on the inputs of the rows."""
         return self.output(operator.masses) + operator.offset - float(operator.masses.sum())
 
-    def projector(self, passive: NDArray[np.bool_]) -> Projector:
+    def projector(self, passive: BoolArray) -> Projector:
         """What the positive cells can fit."""
         return Projector(self, np.flatnonzero(passive))
 

@@ -19,9 +19,8 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes import cause_named
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Past, Values
 from pulsetrainer.diagnosis.causes.delay import Delay
-from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
@@ -31,6 +30,11 @@ class Term:
 
     cause: Cause
     values: Values
+
+    def at_bounds(self, frame: Frame) -> list[bool]:
+        """Tell for each parameter whether it lies at an end of what was searched."""
+        bounds = self.cause.quantities(frame)
+        return [value in (one.low, one.high) for value, one in zip(self.values, bounds, strict=True)]
 
 
 def in_order(terms: Sequence[Term]) -> tuple[Term, ...]:
@@ -124,7 +128,6 @@ class Extended:
         lead: FloatArray,
         inverse: Callable[[FloatArray], inversion.Inverse] | None = None,
         band_Hz: float | None = None,
-        steps: int = LIMITS.inverse_rounds,
     ) -> Tracked:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
@@ -165,7 +168,7 @@ class Extended:
                 )
             elif tried.number > best.steps + LIMITS.inverse_patience:
                 break
-            if tried.number == steps:
+            if tried.number == LIMITS.inverse_rounds:
                 break
         assert best is not None
         return best if late == 0 else _in_time(best, static_inverse(target), target, respond)

@@ -16,11 +16,11 @@ from functools import cached_property, partial
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import Frame, Quantity
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, hysteresis, in_order, shown_output
@@ -35,7 +35,7 @@ class Fitted:
     terms: tuple[Term, ...]
     simulator: Simulator
     design: Design
-    passive: NDArray[np.bool_]
+    passive: BoolArray
     simulated: FloatArray  # (count,) as the causes and the operator give it
     residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float
@@ -61,6 +61,18 @@ class Fitted:
     def projector(self) -> Projector:
         """What its weights can fit."""
         return self.design.projector(self.passive)
+
+    @cached_property
+    def _beside(self) -> FloatArray:
+        """Orthonormal columns (count, k) of what the parameters of its causes change, weights taken off."""
+        own = self.projector(self.slopes)
+        return scipy.linalg.orth(own) if own.shape[1] else own
+
+    def beyond(self, columns: FloatArray) -> FloatArray:
+        """Columns (count, k) less what its weights and the parameters of its causes can do."""
+        free = self.projector(columns)
+        free -= self._beside @ (self._beside.T @ free)
+        return free
 
     def without(self, term: Term) -> Fitted:
         """Return the same with one of its causes taken out; made once for all who ask."""

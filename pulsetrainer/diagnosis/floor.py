@@ -1,8 +1,6 @@
-"""How small an error can be, and how large an effect must be to be relevant.
+"""How small an error can be, and how large an effect must be to be relevant: see ``stages.baseline``.
 
-No cause can lower the noise of the averages, nor the discretisation error: that of the plane's levels, and
-of an input that is read in coarse steps. An effect is irrelevant, however significant it is, if it is smaller
-than the discretisation error, than 0.3 of the noise, or than 0.03 % of the span.
+The discretisation error is that of the plane's levels, and of an input that is read in coarse steps.
 """
 
 from __future__ import annotations

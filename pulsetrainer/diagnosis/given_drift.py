@@ -23,7 +23,7 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
-from pulsetrainer.diagnosis.causes.condition_change import Change, is_near, left_by
+from pulsetrainer.diagnosis.causes.condition_change import Change
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term, in_order
@@ -45,7 +45,7 @@ class Drifted:
     errors: Values  # standard errors over blocks of the time
 
 
-def told(state: State, judged: Judged, changed: Change, noise_rms: float) -> tuple[Finding, Fitted] | None:
+def told(state: State, judged: Judged, changed: Change) -> tuple[Finding, Fitted] | None:
     """Return the drift that the model as given tells, and a fit of new weights with it; None without.
 
     ``changed`` is what another gain and zero would leave.
@@ -55,18 +55,17 @@ def told(state: State, judged: Judged, changed: Change, noise_rms: float) -> tup
     found = {one.cause.id for one in state.findings if one.found and not one.in_doubt} - {OffsetDrift.id}
     others = [term for term in state.current.terms if term.cause.id in found]
     drift, said, moved = _with_drift(state, judged, [])
-    near = left_by(judged.measured, said, noise_rms)
+    near = judged.left_by(said)
     if others:
         beside = _with_drift(state, judged, others)
-        nearer = left_by(judged.measured, beside[1], noise_rms)
+        nearer = judged.left_by(beside[1])
         if nearer < LIMITS.nearer * near:
             (drift, said, moved), near = beside, nearer
         else:
             others = []
-    left = root_mean_square(judged.measured - said)
-    if not is_near(judged.measured, said, noise_rms) or left >= changed.left:
+    if not judged.is_near(said) or root_mean_square(judged.measured - said) >= changed.left:
         return None
-    far = left_by(judged.measured, judged.predicted, noise_rms)
+    far = judged.left_by(judged.predicted)
     most = float(moved[np.argmax(np.abs(moved))])
     half = LIMITS.student * np.asarray(drift.errors)
     rows = zip(drift.cause.quantities(state.problem.frames[0]), drift.values, half, strict=True)

@@ -12,10 +12,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
 from pulsetrainer.core.nnls import SMALLEST_DIAGONAL, factor_of
-from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.fitting import Fitted
@@ -130,6 +129,23 @@ class HeldOut:
             yield fitted.residual[own] - rows.output(change)[own], change[free.size : free.size + extra]
 
 
+def repeated(held_out: HeldOut, before: Fitted, after: Fitted) -> float:
+    """Return the share of the gain of the fit that is found on whole pieces of the time that were left out.
+
+    It is 0 where the error rises on any piece, or at any rates told from the others. A record too short to
+    leave pieces out does not tell, and what is not told does not repeat.
+    """
+    first, second = held_out.pieces(before, LIMITS.pieces), held_out.pieces(after, LIMITS.pieces)
+    if min(first.size, second.size) < LIMITS.pieces:
+        return 0.0
+    gains, fit = first - second, before.squares - after.squares
+    first_at, second_at = held_out.rates(before, LIMITS.rates), held_out.rates(after, LIMITS.rates)
+    told = min(first_at.size, second_at.size)  # a part that the larger model cannot do without tells nothing
+    if min(gains.min(), (first_at[:told] - second_at[:told]).min(initial=np.inf)) < -LIMITS.piece_worse * fit:
+        return 0.0
+    return float(gains.sum() / fit) if fit > 0 else 0.0
+
+
 class _Rows:
     """Rows [D, G, F, r] of all that is fitted (cells, slopes, offset and start) and of the residual.
 
@@ -143,7 +159,7 @@ class _Rows:
         self._beside = np.hstack((bins.settled(fitted.slopes), bins.free, fitted.residual[:, None]))
         self._starts = slice(fitted.slopes.shape[1], self._beside.shape[1] - 1)
 
-    def products(self, own: NDArray[np.bool_]) -> FloatArray:
+    def products(self, own: BoolArray) -> FloatArray:
         """R'R (k + m, k + m) over the rows ``own`` (count,)."""
         beside = self._beside[own]
         cells, across = self._design.products(own, self._cells, beside)

@@ -42,11 +42,8 @@ def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
         return ()
     assert isinstance(term.cause, Unlisted)
     assert state.repeated is not None
-    bank, rows, found = (
-        Bank(state.repeated, state.held_out, Unlisted.order),
-        state.repeated_estimates[term.cause.id],
-        [],
-    )
+    bank = Bank(state.repeated, state.held_out, Unlisted.order)
+    rows, found = state.repeated_estimates[term.cause.id], []
     for k, part in enumerate(term.cause.parts):
         own = slice(k * KNOTS, (k + 1) * KNOTS)
         curve = _curve(state, bank, part, term.values[own], rows[own])

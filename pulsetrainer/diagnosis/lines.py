@@ -22,4 +22,4 @@ def is_a_line(state: State, term: Term, fitted: Fitted, without: Fitted) -> bool
     if not term.cause.line or term.cause.in_step(term.values, frames):
         return False
     most = without.squares - fitted.squares > LIMITS.half * without.squares
-    return most or term.cause.stands_out(term.values, frames, at_full_rate(state.problem, without))
+    return most or term.cause.stands_out(term.values, frames, at_full_rate(without))

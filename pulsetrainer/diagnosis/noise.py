@@ -11,6 +11,8 @@ noise. A sum c'n then has the variance
 with the record padded with as many zeros, so that its ends do not meet. How large the noise is, whatever a
 model still misses, is estimated by ``quiet_square``. It looks where the input rests or is slow, octave by
 octave, and leaves out the largest averages. Noise slower than these octaves is extrapolated from them.
+
+How far the sums of squares of two fits may differ although neither is better, ``doubt`` says.
 """
 
 from __future__ import annotations
@@ -22,10 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.design import Bins
+from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.thresholds import CHI_SQUARE_MEDIAN, LIMITS, TINY
 
 _EXPONENTIAL_MEDIAN = float(np.log(2.0))  # of a line of a periodogram, of its mean
@@ -65,15 +67,22 @@ class Noise:
 
 def noise_in(
     residual: FloatArray,
-    free: Callable[[FloatArray], FloatArray],
+    project: Callable[[FloatArray], FloatArray],
+    axes: FloatArray,
     bins: Bins,
     level: FloatArray,
     rng: np.random.Generator,
 ) -> Noise:
     """Return the noise of a residual (count,) at averaged outputs ``level`` (count,).
 
-    ``free`` takes from columns (count, k) all that was taken from the residual.
+    ``project`` takes from columns (count, k) what was taken from the residual; what goes along ``axes``
+    (count, m), orthonormal, causes could explain: what is left is taken for noise.
     """
+
+    def free(columns: FloatArray) -> FloatArray:
+        left = project(columns)
+        return np.asarray(left - axes @ (axes.T @ left))
+
     left = free(residual[:, None])
     scale = _scale(left[:, 0], bins, level)
     probes = free(rng.standard_normal((bins.count, LIMITS.probes)) * scale[:, None])
@@ -107,7 +116,7 @@ def _scale(left: FloatArray, bins: Bins, level: FloatArray) -> FloatArray:
 
 
 def _by_level(
-    level: FloatArray, counts: NDArray[np.bool_], size: Callable[[NDArray[np.bool_]], float]
+    level: FloatArray, counts: BoolArray, size: Callable[[BoolArray], float]
 ) -> tuple[list[float], list[float]]:
     """Middles of groups of levels, and the size of what counts there; groups of few rows are left out."""
     low, high = float(level.min()), float(level.max())
@@ -210,7 +219,7 @@ def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatA
     return bands[:-1], bands[-1]
 
 
-def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray, trimmed: float) -> float:
+def _square(band: FloatArray, quiet: BoolArray, level: FloatArray, trimmed: float) -> float:
     """Mean square of a band by its medians where it is quiet, at each level of the output."""
     middles, squares = _by_level(level, quiet, lambda own: _trimmed(band[own], trimmed))
     if not squares:
@@ -225,3 +234,30 @@ def _trimmed(values: FloatArray, share: float) -> float:
     edge = float(scipy.stats.norm.isf(0.5 * share))
     expected = 1.0 - 2.0 * edge * float(scipy.stats.norm.pdf(edge)) / (1.0 - share)
     return float(squares[:kept].mean()) / expected
+
+
+def doubt(fitted: Fitted, other: Fitted, noise: Noise | None) -> float:
+    """Difference of squares of two fits that tells nothing: of noise, and of what lies between samples."""
+    if noise is None:
+        return 0.0
+    apart = fitted.projector((other.simulated - fitted.simulated)[:, None])
+    return _by_chance(noise, apart) + _between_samples(fitted, apart[:, 0])
+
+
+def _by_chance(noise: Noise, apart: FloatArray) -> float:
+    """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
+
+    Of squares |e + d|^2 - |e|^2 with e noise and d (count, 1) the difference of the models, 2 d'e is chance.
+    """
+    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(noise.covariance(apart)[0, 0]))
+
+
+def _between_samples(fitted: Fitted, apart: FloatArray) -> float:
+    """Difference of squares of two models, ``apart`` (count,), that what happens between samples can make.
+
+    A turn of the input lies anywhere between two samples, and what is cut off there looks like a share of the
+    second difference of the output: the formulas of short lags differ by just that (decision 101).
+    """
+    bent = [np.diff(y, 2, prepend=y[:1], append=y[-1:]) for y in fitted.simulator.full(fitted.terms)]
+    cut = fitted.projector(fitted.problem.bins.average(bent)[:, None])[:, 0]
+    return 2.0 * LIMITS.cut_turns * abs(float(apart @ cut))

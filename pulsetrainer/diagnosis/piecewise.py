@@ -21,8 +21,8 @@ from pulsetrainer.core.memory import State, negative_saturation
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Past
 from pulsetrainer.diagnosis.extended import Extended, chain
-from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _CARRIED = 4.0  # of the filter's pad: errors of the piece before that the filter sees

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray, Plane
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, counted_output
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import Bins, Followed, bins_of
 from pulsetrainer.diagnosis.extended import Term, seen_input
@@ -105,7 +105,7 @@ def problem_for(
 def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:
     """Mean outputs near both ends of the input's range, or as near as the records come to them."""
     u = np.concatenate([r.input[r.counts] for r in records])
-    y = np.concatenate([r.output[r.counts] for r in records])
+    y = counted_output(records)
     near = LIMITS.near_end * (high - low)
     bottom = y[u <= max(low, float(u.min())) + near]
     top = y[u >= min(high, float(u.max())) - near]

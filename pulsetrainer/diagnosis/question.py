@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.artefacts.units import counted, same_units, units_of, with_unit
 from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.state import Given, Question
@@ -148,7 +147,7 @@ def measured_of(
     return Record(u, polarity * run.output[good], weight, dt_s=step, reference=reference), stamps
 
 
-def _time_of(run: Run, good: NDArray[np.bool_]) -> tuple[float | None, FloatArray | None]:
+def _time_of(run: Run, good: BoolArray) -> tuple[float | None, FloatArray | None]:
     """Return the usual time step, and the times of the good samples where they are not even."""
     if run.time_s is None or run.dt_s is None:
         return None, None

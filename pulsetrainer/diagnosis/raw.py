@@ -7,15 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
+from pulsetrainer.core.wild import repaired
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE, TINY
 from pulsetrainer.errors import DataError
-
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -54,9 +52,7 @@ class Raw:
         """The record with its wild samples filled in: they pile up at the converter's end."""
         if self.wild is None:
             return self.record
-        good = np.flatnonzero(~self.wild)
-        output = np.interp(np.arange(self.wild.size), good, self.record.output[good])
-        return replace(self.record, output=output)
+        return replace(self.record, output=repaired(self.record.output, self.wild))
 
 
 @dataclass(frozen=True)
@@ -110,6 +106,12 @@ def _gaps(stamps: FloatArray, step: float) -> BoolArray:
     steps = np.diff(stamps)
     usual = np.maximum(scipy.ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
     return np.asarray(steps > LIMITS.gap_steps * usual)
+
+
+def runs_of(at: BoolArray) -> list[tuple[int, int]]:
+    """Return where each run of samples that are ``at`` (n,) begins, and the first sample after it."""
+    ends = np.flatnonzero(np.diff(at, prepend=False, append=False)).tolist()
+    return list(zip(ends[::2], ends[1::2], strict=True))
 
 
 def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:

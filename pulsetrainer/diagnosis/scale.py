@@ -20,7 +20,7 @@ import numpy as np
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, counted_output
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.raw import as_fast_as_its_hum
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -106,7 +106,7 @@ class Scale:
 
 def scale_of(records: Sequence[Record], low: float, high: float, second: float) -> Scale:
     """Return the scale of some records: gates have looked at them, and what they masked has no weight."""
-    y = np.concatenate([r.output[r.counts] for r in records])
+    y = counted_output(records)
     bottom, top = np.quantile(y, LIMITS.span_quantiles) if y.size else (0.0, 0.0)
     span = float(top - bottom) or (float(np.ptp(y)) if y.size else 0.0) or 1.0
     return Scale(low, high - low, float(np.mean(y)) if y.size else 0.0, span, second)

@@ -21,7 +21,7 @@ values.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -34,7 +34,6 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late, Values
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in
-from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 
@@ -142,10 +141,10 @@ def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
     """Score every cause that is not in the model yet, with the chance that noise scores as much."""
     project, problem = fitted.projector, fitted.problem
     residual = project(fitted.residual[:, None])[:, 0]
-    blocks = _blocks(problem, fitted, fitted)
+    blocks = _blocks(fitted, fitted)
     if not blocks:
         return Screen()
-    noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
+    noise = noise_in(residual, project, _axes(blocks), problem.bins, problem.measured, rng)
     covariance = noise.covariance(project(_side_by_side(blocks)))
     known, critical = _p_values(blocks, residual, covariance, LIMITS.draws, rng)
     return Screen(_scores(fitted, blocks, residual, known, _sights(blocks, covariance, critical)), noise)
@@ -159,7 +158,7 @@ def ranked(fitted: Fitted, whole: Fitted) -> tuple[Score, ...]:
     """
     if fitted not in _RANKED:
         residual = fitted.projector(fitted.residual[:, None])[:, 0]
-        blocks = _blocks(fitted.problem, fitted, whole)
+        blocks = _blocks(fitted, whole)
         _RANKED[fitted] = _scores(fitted, blocks, residual, np.ones(len(blocks)), {})
     return _RANKED[fitted]
 
@@ -180,7 +179,7 @@ def _scores(
         p_values[name] = min(p_values.get(name, 1.0), float(known[k]))
         if name not in best or gains[k] > gains[best[name]]:
             best[name] = k
-    frames, left = fitted.problem.frames, at_full_rate(fitted.problem, fitted)
+    frames, left = fitted.problem.frames, at_full_rate(fitted)
     scores = [
         Score(
             block.cause,
@@ -241,24 +240,17 @@ def _sights(blocks: Sequence[_Block], covariance: FloatArray, critical: float) -
     }
 
 
-def _less(
-    project: Callable[[FloatArray], FloatArray], blocks: Sequence[_Block]
-) -> Callable[[FloatArray], FloatArray]:
-    """Take from columns what weights and all causes could explain: what is left is taken for noise."""
+def _axes(blocks: Sequence[_Block]) -> FloatArray:
+    """Orthonormal columns (count, k) of all that causes could explain."""
     everything = _side_by_side(blocks)
     size, axes = np.linalg.eigh(everything.T @ everything)
     kept = size > LIMITS.rank**2 * size[-1]
-    axes = everything @ (axes[:, kept] / np.sqrt(size[kept]))
-
-    def free(columns: FloatArray) -> FloatArray:
-        left = project(columns)
-        return np.asarray(left - axes @ (axes.T @ left))
-
-    return free
+    return np.asarray(everything @ (axes[:, kept] / np.sqrt(size[kept])))
 
 
-def at_full_rate(problem: Problem, fitted: Fitted) -> list[FloatArray]:
+def at_full_rate(fitted: Fitted) -> list[FloatArray]:
     """Residual (n,) of every record at its own rate, zero where samples have no weight."""
+    problem = fitted.problem
     wrong = problem.measured - fitted.simulated
     start = problem.bins.free @ (problem.bins.free.T @ wrong)
     found = []
@@ -278,15 +270,12 @@ def p_value(observed: float, drawn: FloatArray) -> float:
     return (1.0 + float(np.count_nonzero(drawn >= observed))) / (1.0 + drawn.size)
 
 
-def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
+def _blocks(fitted: Fitted, changed: Fitted) -> list[_Block]:
     """All blocks of columns, weights and the causes already in the model projected off.
 
     A column is what a cause changes in ``changed``.
     """
-    project = fitted.projector
-    own = project(fitted.slopes)
-    known = scipy.linalg.orth(own) if own.shape[1] else own
-    parts = at_full_rate(problem, fitted)
+    problem, parts = fitted.problem, at_full_rate(fitted)
     timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [
         (kind, values)
@@ -299,8 +288,7 @@ def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
         return []
     # all at once: the projection is bound by reading the rows
     columns = np.asarray([changed.change(Term(cause, one)) for cause, values in tried for one in values]).T
-    free = project(columns)
-    free -= known @ (known.T @ free)
+    free = fitted.beyond(columns)
     size, whole_size = np.linalg.norm(free, axis=0), np.linalg.norm(columns, axis=0)
     visible = np.isfinite(size) & (size > LIMITS.visible * whole_size)  # else the weights can do all of it
     found: list[_Block] = []

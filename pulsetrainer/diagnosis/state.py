@@ -85,9 +85,7 @@ class State:
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
     sights: Mapping[str, Sight] = field(default_factory=dict)  # of every cause that was screened
-    detectable: Mapping[str, float] = field(
-        default_factory=dict
-    )  # from which effects would show, of the span
+    detectable: Mapping[str, float] = field(default_factory=dict)  # shares of the span that would show
     extended: Model | None = None  # with those causes
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
@@ -245,6 +243,11 @@ class State:
     def _of_device(self, fault: Finding) -> bool:
         """Whether a fault of the measurement may be something that the device does."""
         return self.unexplained or any(library()[name].lasting for name in fault.confounded_with)
+
+    def in_its_units(self, known: Mapping[str, tuple[Estimate, ...]]) -> dict[str, tuple[Estimate, ...]]:
+        """Return estimates in the units of the records; of what equal loops show, those of the loops."""
+        both = {**known, **self.by_contrast}
+        return {name: tuple(self.scale.estimate(one) for one in rows) for name, rows in both.items()}
 
     def rms_of(self, share: float) -> float:
         """Rms of a share of what can be explained."""

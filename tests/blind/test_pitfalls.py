@@ -19,13 +19,13 @@ import pulsetrainer.simulation
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.diagnosis import gates, residual
-from pulsetrainer.diagnosis.causes import library, stick_slip
+from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.causes import fired_on, library, stick_slip
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.procedure import diagnose
-from pulsetrainer.diagnosis.raw import noise_of
+from pulsetrainer.diagnosis.raw import Raw, noise_of
 from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.state import Question
 
@@ -152,7 +152,7 @@ def test_a_hum_is_not_taken_for_sticking_as_well():
     settings = device | {"periodic": 0.179, "periodic-frequency": 12.657}
     data = hidden.measure(hidden.Case(0, (), settings))
     record = data.records[0]
-    assert "stick-slip" not in {f.cause for f in gates.check(record, 0.0, data.high)}
+    assert "stick-slip" not in {f.cause for f in fired_on(Raw(record, 0.0, data.high))}
     # naive: seven standard deviations of white noise, whatever its colour
     wide = stick_slip._WIDE_LEAST * 2
     white = 7.0 * np.sqrt(2.0 / wide) * noise_of(record.output)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pulsetrainer.core.correlation import correlation_time
+from pulsetrainer.core.metrics import correlation_time
 
 
 @pytest.mark.parametrize(("memory", "expected"), [(0.0, 1.0), (0.5, 3.0), (0.9, 19.0)])

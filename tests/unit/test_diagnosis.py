@@ -13,8 +13,8 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import experiment, fitting, gates, raw, residual
-from pulsetrainer.diagnosis.causes import cause_named, library
+from pulsetrainer.diagnosis import experiment, fitting, raw, residual
+from pulsetrainer.diagnosis.causes import cause_named, fired_on, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
@@ -179,7 +179,7 @@ def _record(y: np.ndarray, u: np.ndarray | None = None, reference: np.ndarray | 
 
 
 def _fired(record: Record) -> dict:
-    return {f.cause: f for f in gates.check(record, 0.0, 1.5)}
+    return {f.cause: f for f in fired_on(raw.Raw(record, 0.0, 1.5))}
 
 
 def test_gates_fire_on_what_they_are_for_and_not_otherwise():

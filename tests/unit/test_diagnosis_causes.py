@@ -16,7 +16,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
-from pulsetrainer.diagnosis.causes import condition_change, library, outliers, rate_widening
+from pulsetrainer.diagnosis.causes import condition_change, fired_on, library, outliers, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
 from pulsetrainer.diagnosis.causes.step import _split
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
@@ -657,16 +657,14 @@ def test_slow_noise_at_rest_tells_how_large_jumps_must_be(deviations, fires):
 
 def test_gates_do_not_see_what_blinds_them():
     """Wild samples are filled in for the others; where the output is cut off no jumps are sought."""
-    from pulsetrainer.diagnosis import gates
-
     y, u = _stairs(30, 0.5)
     y[100::300] += 50.0
-    fired = {one.cause: one for one in gates.check(_raw(y, u).record, 0.0, 3.0)}
+    fired = {one.cause: one for one in fired_on(Raw(_raw(y, u).record, 0.0, 3.0))}
     assert set(fired) == {"outliers", "stick-slip"}
     assert fired["stick-slip"].figures["count"] == 30
     piled = np.concatenate((y, np.random.default_rng(3).permutation(_piled(60, 0)) + 100.0))
     u = np.concatenate((u, np.full(3060, 2.0)))
-    names = [one.cause for one in gates.check(_raw(piled, u).record, 0.0, 3.0)]
+    names = [one.cause for one in fired_on(Raw(_raw(piled, u).record, 0.0, 3.0))]
     assert "saturation" in names
     assert "stick-slip" not in names
 
@@ -682,10 +680,8 @@ def test_gates_do_not_see_what_blinds_them():
 )
 def test_gates_are_not_asked_about_what_was_taken_out(corrected, fired):
     """Nor about what is left of coarse steps: flat runs and jumps."""
-    from pulsetrainer.diagnosis import gates
-
     y, u = _stairs(30, 0.5)
-    found = gates.check(_raw(y, u).record, 0.0, 3.0, corrected=corrected)
+    found = fired_on(Raw(_raw(y, u).record, 0.0, 3.0), corrected)
     assert ("stick-slip" in [one.cause for one in found]) is fired
 
 

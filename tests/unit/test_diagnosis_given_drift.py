@@ -103,13 +103,13 @@ def test_the_curve_is_that_of_the_cause():
 
 def _told(monkeypatch, judged):
     """Ask about a drift that brings the given model near, on one record, with nothing else in the model."""
-    monkeypatch.setattr(given_drift, "is_near", lambda *_: True)
+    judged.is_near = lambda _: True
     monkeypatch.setattr(given_drift, "weights_for", lambda *_: "weights")
     state = SimpleNamespace(
         question=SimpleNamespace(timed=True, quick=False), findings=(), current=SimpleNamespace(terms=()),
         problem=SimpleNamespace(frames=[FRAME]), scale=SimpleNamespace(estimate=lambda one: one),
     )  # fmt: skip
-    return given_drift.told(state, judged, SimpleNamespace(left=1.0), 0.1)
+    return given_drift.told(state, judged, SimpleNamespace(left=1.0))
 
 
 @pytest.mark.parametrize(("error", "is_told"), [(0.004, True), (0.006, False)])
@@ -119,8 +119,8 @@ def test_a_drift_that_may_be_nothing_is_not_told(monkeypatch, error, is_told):
     drift = given_drift.Drifted(cause, (0.01, 0.0), (error, 0.001))
     said = np.zeros(N)
     monkeypatch.setattr(given_drift, "_with_drift", lambda *_: (drift, said, said))
-    monkeypatch.setattr(given_drift, "left_by", lambda *_: 0.1)
     judged = SimpleNamespace(measured=said, predicted=said, polarity=1)
+    judged.left_by = lambda _: 0.1
     told = _told(monkeypatch, judged)
     assert (told is not None) is is_told
 
@@ -130,7 +130,7 @@ def test_what_a_drift_leaves_is_told_as_noise_where_it_is_no_more(monkeypatch, l
     """It was told as 0 um."""
     drift, zeros = given_drift.Drifted(OffsetDrift(), (0.01, 0.0), (0.001, 0.001)), np.zeros(N)
     monkeypatch.setattr(given_drift, "_with_drift", lambda *_: (drift, zeros, zeros + 0.9))
-    monkeypatch.setattr(given_drift, "left_by", lambda _, predicted, __: left if predicted is zeros else 1.0)
     judged = SimpleNamespace(measured=zeros, predicted=zeros + 1.0, polarity=1)
+    judged.left_by = lambda predicted: left if predicted is zeros else 1.0
     finding, _ = _told(monkeypatch, judged)
     assert said in wording.cause_text(finding, wording.PLAIN)

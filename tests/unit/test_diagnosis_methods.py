@@ -21,9 +21,7 @@ from pulsetrainer.diagnosis import (
     experiment,
     fast_causes,
     floor,
-    intervals,
     question,
-    repeats,
     residual,
     screening,
     velocity,
@@ -38,13 +36,13 @@ from pulsetrainer.diagnosis.extended import Term, chain
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_for
 from pulsetrainer.diagnosis.floor import Floor
-from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.held_out import HeldOut, repeated
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import _log_tail, p_value
-from pulsetrainer.diagnosis.stages import advice, first_stroke
+from pulsetrainer.diagnosis.stages import advice, first_stroke, parameters
 from pulsetrainer.diagnosis.state import Question
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
@@ -252,7 +250,7 @@ def test_a_residual_at_the_full_rate_averages_to_the_one_that_was_fitted():
     y = np.where(counts, 3.0 * u + 0.1 * np.sin(np.arange(u.size) / 9.0), 99.0)
     problem = problem_for([Record(u, y, 1.0 * counts, dt_s=0.01)], 0.0, 1.5)
     fitted = weights_for(problem, (), None)
-    (left,) = screening.at_full_rate(problem, fitted)
+    (left,) = screening.at_full_rate(fitted)
     assert np.all(left[~counts] == 0.0)
     np.testing.assert_allclose(problem.bins.average([left]), fitted.residual, atol=1e-9)
 
@@ -491,12 +489,12 @@ def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, 
     fitted = SimpleNamespace(
         terms=(term,), slopes=column, projector=lambda x: x, problem=SimpleNamespace(frames=[FRAME])
     )
-    monkeypatch.setattr(intervals, "_late", lambda fitted: np.asarray([0.02, 0.0]))
-    monkeypatch.setattr(intervals, "_otherwise", lambda fitted: [np.asarray([-0.04, 5.0])])
+    monkeypatch.setattr(parameters, "_late", lambda fitted: np.asarray([0.02, 0.0]))
+    monkeypatch.setattr(parameters, "_otherwise", lambda fitted: [np.asarray([-0.04, 5.0])])
     told = SimpleNamespace(covariance=lambda columns: 0.04**2 * columns.T @ columns)  # 0.02 of the parameter
     noise = SimpleNamespace(noise=told)
     told = SimpleNamespace(jackknife=lambda fitted: None if jackknife is None else np.asarray([jackknife]))
-    (one,) = intervals.estimates_of(fitted, noise, told, Floor(4, 1.0, 1.0, 1.0, 0.05))["output-lag"]
+    (one,) = parameters.estimates_of(fitted, noise, told, Floor(4, 1.0, 1.0, 1.0, 0.05))["output-lag"]
     half = np.sqrt(2.26**2 * variance + (0.2 * 0.05 * 2.0 / 2.0) ** 2 + 0.01**2 + 0.02**2)
     assert (one.value, one.lower, one.upper) == pytest.approx((0.3, 0.3 - half, 0.3 + half))
 
@@ -1270,7 +1268,7 @@ def test_a_cause_repeats_on_pieces_of_the_time_and_at_other_rates(pieces, rates,
         pieces=lambda fitted, _: np.asarray(pieces) * (fitted is before),
         rates=lambda fitted, _: np.asarray(rates) * (fitted is before),
     )
-    assert repeats.repeated(told, before, after) == pytest.approx(share)
+    assert repeated(told, before, after) == pytest.approx(share)
 
 
 def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
@@ -1280,7 +1278,7 @@ def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
         pieces=lambda fitted, _: np.full(5, 1.0 if fitted is before else 0.0),
         rates=lambda fitted, _: np.zeros(4 if fitted is before else 0),
     )
-    assert repeats.repeated(told, before, after) == pytest.approx(0.5)
+    assert repeated(told, before, after) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

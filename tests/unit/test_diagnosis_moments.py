@@ -13,10 +13,10 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.floor import floor_of
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.intervals import estimates_of
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.stages.acceptance import settled
+from pulsetrainer.diagnosis.stages.parameters import estimates_of
 
 DT, CYCLE_S, REST_S = 0.01, 4.0, 1.6
 STEP = library()["step"]

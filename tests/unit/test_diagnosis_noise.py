@@ -35,7 +35,7 @@ def _coloured(rng, how: float) -> np.ndarray:
 
 
 def _told(x: np.ndarray, free=lambda columns: columns) -> Noise:
-    return noise_in(x, free, _bins(), LEVEL, np.random.default_rng(1))
+    return noise_in(x, free, np.zeros((x.size, 0)), _bins(), LEVEL, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("how", [0.0, 0.5, 0.95])
@@ -53,7 +53,9 @@ def test_noise_that_grows_with_the_level_is_larger_there():
     """Ten times as large at the top: so it is along a column that lives there."""
     rng = np.random.default_rng(3)
     x = (0.1 + 0.9 * LEVEL) * rng.standard_normal(COUNT)
-    noise = noise_in(x, lambda columns: columns, _bins(), LEVEL + 5.0, np.random.default_rng(1))
+    noise = noise_in(
+        x, lambda columns: columns, np.zeros((x.size, 0)), _bins(), LEVEL + 5.0, np.random.default_rng(1)
+    )
     high, low = (LEVEL > 0.9).astype(float), (LEVEL < 0.1).astype(float)
     spread = np.sqrt(
         np.diagonal(noise.covariance(np.stack((high, low), axis=1) * np.sign(rng.normal(size=(COUNT, 1)))))

@@ -730,7 +730,7 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     best = SimpleNamespace(p_value=p_value, fall=gain, starts=((part, term.values),))
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
     monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: again)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: float(again))
     _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(left), held_out=HeldOut(float(again))))
     assert after.current.names == (("unlisted",) if learned else ())
@@ -763,7 +763,7 @@ def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypa
 
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: 1.0)
     _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
     assert [len(term.cause.parts) for term in after.current.terms] == [curves]
@@ -781,7 +781,7 @@ def test_whether_output_or_gain_depends_on_it_the_refit_tells(monkeypatch, of_ga
 
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
-    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "repeated", lambda *_: 1.0)
     _nothing_else_happens(monkeypatch)
     (term,) = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0))).current.terms
     assert [part.gain for part in term.cause.parts] == [not added]
@@ -1823,6 +1823,12 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
     assert found.findings[0].parameters == (tuple(told) if at_rest else known)
     fewer = begin.stage(replace(state, estimates={"creep": known[:1]}))  # of another number of curves
     assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
+    # what equal loops show is told in the units of the record, as all else
+    loops = {"load-dependence": (Estimate("coefficient", 5.0, "{u}/{y}", 4.0, 6.0),)}
+    scale = Scale(reach=3.0, span=2.0)
+    both = begin.stage(replace(state, by_contrast=loops, scale=scale, estimates={}))
+    told = (Estimate("coefficient", 7.5, "{u}/{y}", 6.0, 9.0),)
+    assert both.repeated_estimates.get("load-dependence") == (told if at_rest else None)
 
 
 @pytest.mark.parametrize(
@@ -2037,7 +2043,7 @@ def _given(
     fit = SimpleNamespace(warning=warning, output=np.asarray(fitted))
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
     played = SimpleNamespace(input=np.asarray(inputs), output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
-    judged = given_model.Judged([played], [RAMP - predicted], RAMP, predicted, speed, polarity)
+    judged = given_model.Judged([played], [predicted], speed, polarity, 0.0)
     monkeypatch.setattr(given_model, "judge", lambda state, given: judged)
     monkeypatch.setattr(given_model, "_drifted", lambda *_: None)  # test_diagnosis_given_drift
     monkeypatch.setattr(velocity, "compare", lambda *_: velocity.Comparison(1.0, direction, 10.0))
@@ -2207,7 +2213,8 @@ def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
             return [RAMP]
 
     current = SimpleNamespace(rms=0.01, terms=(_term("creep"),), simulator=Simulator())
-    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
+    inputs = np.asarray([0.0, 1.0, 0.0])
+    record = SimpleNamespace(input=inputs, output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     findings = (replace(_finding("creep", 20.0), doubts=doubts),)
@@ -2221,7 +2228,8 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     cause = Unlisted() if name == "unlisted" else CAUSE[name]
     simulator = SimpleNamespace(full=lambda terms: [RAMP], inner=lambda terms: [RAMP])
     current = SimpleNamespace(rms=0.01, terms=(SimpleNamespace(cause=cause),), simulator=simulator)
-    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
+    inputs = np.asarray([0.0, 1.0, 0.0])
+    record = SimpleNamespace(input=inputs, output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     found = (Finding(cause, found=True),)

@@ -47,10 +47,10 @@ def test_the_house_as_it_stands(check):
         ("device/device.py", "import pulsetrainer.simulation.bench", "Floors"),
         ("device/schemes.py", "import pulsetrainer.files.store", "Device, files and diagnosis"),
         ("files/store.py", "import pulsetrainer.device.codes", "Device, files and diagnosis"),
-        ("diagnosis/gates.py", "import pulsetrainer.files.store", "Device, files and diagnosis"),
+        ("diagnosis/raw.py", "import pulsetrainer.files.store", "Device, files and diagnosis"),
         ("core/plane.py", "import h5py", "The core is numpy and scipy only"),
         ("steps/identify.py", "import pathlib", "Verbs know no file"),
-        ("diagnosis/gates.py", "import rich", "Libraries do not print"),
+        ("diagnosis/raw.py", "import rich", "Libraries do not print"),
     ],
 )
 def test_a_bad_import_breaks_its_contract(check, module, line, contract):

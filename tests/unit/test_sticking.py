@@ -10,11 +10,10 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import gates
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import fired_on, library
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.raw import Firing, Raw
 
 DT = 1e-3
 FINE = excitations.diagnostic(0.0, 1.5, rate_Hz=10 / DT).value[:600_000]  # a device jumps between samples too
@@ -55,13 +54,13 @@ def test_jumps_of_a_few_times_the_noise_are_measured(force):
     assert found.cause == "stick-slip"
     assert found.value == pytest.approx(0.6 * force, rel=0.1)
     if force < 0.3:  # the gate on single jumps is blind to these
-        assert "stick-slip" not in {f.cause for f in gates.check(record, 0.0, 1.5)}
+        assert "stick-slip" not in {f.cause for f in fired_on(Raw(record, 0.0, 1.5))}
 
 
 def test_large_jumps_are_seen_one_by_one():
     """Where few of them fit into a stroke the gate on the raw data sees each."""
     _, record = _sawtooth(_stuck(_smooth(), 0.9))
-    fired = {f.cause: f.value for f in gates.check(record, 0.0, 1.5)}
+    fired = {f.cause: f.value for f in fired_on(Raw(record, 0.0, 1.5))}
     assert fired["stick-slip"] == pytest.approx(0.54, rel=0.2)
 
 

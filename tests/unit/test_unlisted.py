@@ -19,14 +19,12 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import dependence, learned
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.base import Frame, Past
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.fitting import weights_for
-from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.past import Past
+from pulsetrainer.diagnosis.held_out import HeldOut, repeated
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.repeats import repeats
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 from wording import raises
@@ -355,7 +353,8 @@ class _Fit:
 def test_what_repeats(after, expected):
     """Half of what the fit gains, and no piece worse by a tenth of it."""
     held_out = _Pieces(before=[2.0] * 5, after=after)
-    assert repeats(held_out, _Fit("before", 10.0), _Fit("after", 5.0)) is expected
+    share = repeated(held_out, _Fit("before", 10.0), _Fit("after", 5.0))
+    assert (share >= LIMITS.repeated) is expected
 
 
 def test_a_zero_that_wanders_explains_what_follows_the_time_and_no_more():

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 
 from pulsetrainer.artefacts import Cause as Found
 from pulsetrainer.artefacts import Extension
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.errors import DataError
 
 
@@ -44,6 +46,28 @@ def cause_named(name: str) -> Cause:
             hint="update pulsetrainer, or extend the model again",
         )
     return library()[name]
+
+
+def fired_on(raw: Raw, corrected: Sequence[str] = ()) -> list[Firing]:
+    """Ask every gate about a record as it was measured.
+
+    Wild samples are found first and taken out for the others; a gate is not asked where one has fired that
+    blinds it, nor about what was taken out of the record already (``corrected``) or is left of that.
+    """
+    causes = with_gates(taken_out(corrected))
+    fired: dict[str, Firing] = {}
+    for cause in sorted(causes, key=lambda one: not one.wild):
+        if not any(name in fired for name in cause.blinded_by):
+            firing = cause.gate(raw)
+            if firing is not None:
+                fired[cause.id] = firing
+                raw = replace(raw, wild=firing.mask) if cause.wild else raw
+    return [fired[cause.id] for cause in causes if cause.id in fired]
+
+
+def with_gates(out: Collection[str] = ()) -> list[Cause]:
+    """Return the causes that are found on the raw data, but for some."""
+    return [one for one in library().values() if one.stage == "record" and one.id not in out]
 
 
 def taken_out(corrected: Iterable[str]) -> set[str]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 _TRIED = 0.05  # amplitude
 _TRIED_PATHS = (7.0, 20.0, 60.0)  # ranges of the input: some loops, dozens, a whole record
@@ -48,12 +48,12 @@ class Accommodation(Cause):
         share = np.diff(done, prepend=0.0)
         # LP(y) = exp(-s) (y0 + integral of y exp(s') ds'), with exp kept small by an origin per stretch
         slow = np.empty_like(y)
-        last, begin = float(remembered(frame.past, self.id, y[:1])[0]), 0
+        last, begin = float(frame.remembered(self.id, y[:1])[0]), 0
         while begin < y.size:
             origin = done[begin - 1] if begin else 0.0
             end = max(int(np.searchsorted(done, origin + _STRETCH)), begin + 1)
             grown = np.exp(done[begin:end] - origin)
             slow[begin:end] = (last + np.cumsum(y[begin:end] * grown * -np.expm1(-share[begin:end]))) / grown
             last, begin = float(slow[end - 1]), end
-        remember(frame.past, self.id, slow[-1:])
+        frame.remember(self.id, slow[-1:])
         return (y + values[0] * slow) / (1.0 + values[0])

@@ -21,7 +21,6 @@ from pulsetrainer.core import wild
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 if TYPE_CHECKING:
@@ -52,6 +51,22 @@ class Quantity:
     high: float
     small: float  # a step that matters little: for differences
     meaning: str = ""  # of what it is, in words; {input} and {output} are what was measured
+
+
+@dataclass
+class Past:
+    """What the causes of a chain remember, by name: of the piece before, and as it is after this one.
+
+    A chain that feeds its output back passes a piece several times: each time from ``before``, and the last
+    time counts.
+    """
+
+    before: dict[str, FloatArray] = field(default_factory=dict)
+    after: dict[str, FloatArray] = field(default_factory=dict)
+
+    def next(self) -> Past:
+        """Return what the piece that follows begins with."""
+        return Past(before={**self.before, **self.after})
 
 
 @dataclass(frozen=True)
@@ -86,9 +101,9 @@ class Frame:
     @cached_property
     def path(self) -> FloatArray:
         """Length of the input's path at each sample (n,), wiggles of noise left out."""
-        before = remembered(self.past, "path", self.input[:1])
+        before = self.remembered("path", self.input[:1])
         turned = settled(self.input, _NO_PATH * self.reach, float(before[0]))
-        remember(self.past, "path", turned[-1:])
+        self.remember("path", turned[-1:])
         return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
 
     def about(self, zero: float) -> Frame:
@@ -96,6 +111,27 @@ class Frame:
         one = replace(self, zero=zero)
         one.__dict__["path"] = self.path
         return one
+
+    @property
+    def is_first(self) -> bool:
+        """Whether nothing is remembered of a piece before."""
+        return self.past is None or not self.past.before
+
+    def remembered(self, name: str, at_first: FloatArray) -> FloatArray:
+        """Return what the piece before kept under a name; ``at_first`` where there was none."""
+        return at_first if self.past is None else self.past.before.get(name, at_first)
+
+    def remember(self, name: str, values: FloatArray) -> None:
+        """Keep something for the piece that follows."""
+        if self.past is not None:
+            self.past.after[name] = values
+
+    def low_pass(self, x: FloatArray, tau_s: float, name: str) -> FloatArray:
+        """Return x (n,) behind a lag, going on from where the piece before, of the same name, ended."""
+        last = self.remembered(f"lag {name}", np.repeat(x[:1], 2))
+        filtered = low_pass(x, tau_s, self.dt_s, last)
+        self.remember(f"lag {name}", np.asarray([x[-1], filtered[-1]]))
+        return filtered
 
 
 @dataclass(frozen=True)
@@ -195,8 +231,11 @@ class Cause:
         return parameters[: self.strengths]
 
     def sign(self, name: str, polarity: int) -> int:
-        """Return by what a parameter is multiplied when the output is, by its polarity; sizes stay."""
-        own = [q for q in self.parameters if q.name == name]
+        """Return by what a parameter is multiplied when the output is, by its polarity; sizes stay.
+
+        Those of later records have its name and a number.
+        """
+        own = [q for q in self.parameters if q.name == name.partition(" ")[0]]
         return polarity if any("{y}" in q.unit and q.low < 0 for q in own) else 1
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
@@ -304,7 +343,6 @@ class OfKinds(Cause):
         return self._kinds
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:
-        """Return what a model must keep of it besides its parameters: name, value and unit."""
         return () if self.kind == self.tried[0] else ((self.number, self.kind, "1"),)
 
     def restored(self, values: Values) -> tuple[Cause, Values]:
@@ -326,23 +364,10 @@ def spread(low: float, high: float, ratio: float) -> list[float]:
     return [float(one) for one in np.geomspace(low, high, count)]
 
 
-def remembered(past: Past | None, name: str, at_first: FloatArray) -> FloatArray:
-    """Return what the piece before kept under a name; ``at_first`` where there was none."""
-    return at_first if past is None else past.before.get(name, at_first)
-
-
-def remember(past: Past | None, name: str, values: FloatArray) -> None:
-    """Keep something for the piece that follows."""
-    if past is not None:
-        past.after[name] = values
-
-
-def low_pass(
-    x: FloatArray, tau_s: float, dt_s: float, past: Past | None = None, name: str = ""
-) -> FloatArray:
+def low_pass(x: FloatArray, tau_s: float, dt_s: float, last: FloatArray | None = None) -> FloatArray:
     """Solve tau x' + x = input for an input that is straight between samples, from rest at x[0].
 
-    With ``past`` it goes on from where the piece before, of the same ``name``, ended.
+    ``last`` (2,) is the last input and output before, where it does not begin at rest.
 
     Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
     """
@@ -352,11 +377,9 @@ def low_pass(
     slope = 1.0 - tau_s / dt_s * (1.0 - a)
     b = np.asarray([slope, 1.0 - a - slope])
     # the filter's first step must see the first value as its past
-    last_in, last_out = remembered(past, f"lag {name}", np.repeat(x[:1], 2))
+    last_in, last_out = np.repeat(x[:1], 2) if last is None else last
     state = scipy.signal.lfiltic(b, np.asarray([1.0, -a]), y=[last_out], x=[last_in])
-    filtered, _ = scipy.signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)
-    remember(past, f"lag {name}", np.asarray([x[-1], filtered[-1]]))
-    return np.asarray(filtered)
+    return np.asarray(scipy.signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)[0])
 
 
 def settled(values: FloatArray, width: float, at: float | None = None) -> FloatArray:

@@ -19,9 +19,9 @@ from typing import ClassVar
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
-from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, runs_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _PARTS = 5  # of a rest, of which means are taken: shorter rests show no course
@@ -120,13 +120,7 @@ def _within_noise(u: FloatArray) -> BoolArray:
 
 def _rests(u: FloatArray, y: FloatArray, at: BoolArray) -> Rests | None:
     """Return what is told of the rests that are long enough, and no end of the record; None of too few."""
-    edges = np.diff(at.astype(np.int8), prepend=0, append=0)
-    begins, ends = (np.flatnonzero(edges == way).tolist() for way in (1, -1))
-    long = [
-        (b, e)
-        for b, e in zip(begins, ends, strict=True)
-        if e - b >= _PARTS and b >= e - b and e + (e - b) <= u.size
-    ]
+    long = [(b, e) for b, e in runs_of(at) if e - b >= _PARTS and b >= e - b and e + (e - b) <= u.size]
     if len(long) < _PLACES:
         return None
     output = np.asarray([_means(y[b:e]) for b, e in long])

@@ -10,15 +10,16 @@ offset that bring the given prediction to the record say how: y = (1 + g) M(u) +
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.evidence import sentences
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.finding import Estimate
@@ -52,29 +53,21 @@ class ConditionChange(Cause):
         Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
     )
     lasting = False
-    texts: ClassVar[Mapping[str, str]] = {
-        "shifted": (
-            "a Preisach model fitted to these recordings describes them, but the given one does not: the "
-            "device is in another condition (load, configuration, zero). Its output is shifted by "
-            "{shift:.2g}{in_y} on average; gain and shape hardly differ ({gain:+.1f} %, {left:.2g}{in_y} "
-            "rms). Reset the zero before each use, or identify it again"
-        ),
-        "changed": (
-            "a Preisach model fitted to these recordings describes them, but the given one does not: the "
-            "device is in another condition (load, configuration, zero). Its output is shifted by "
-            "{shift:.2g}{in_y} on average, its gain differs by {gain:+.1f} %, and its shape by "
-            "{left:.2g}{in_y} rms. Identify it again in this condition"
-        ),
-        "reversed": (
-            "the {output} falls where the model rises: {times:.3f} times what the model says, and an offset, "
-            "leave {left:.2g}{in_y} rms. The sensor or the coil is connected the wrong way round, or the "
-            "model is of another device. Identify it again"
-        ),
-        "each": (
-            "the model as given is off by {given:.2g} % of the span (rms); against it the {output} is "
-            "shifted by {shift:+.2g}{in_y} on average and has {times:.3f} times the gain"
-        ),
-    }
+    texts = sentences("""
+        shifted: a Preisach model fitted to these recordings describes them, but the given one does not: the
+            device is in another condition (load, configuration, zero). Its output is shifted by
+            {shift:.2g}{in_y} on average; gain and shape hardly differ ({gain:+.1f} %, {left:.2g}{in_y} rms).
+            Reset the zero before each use, or identify it again
+        changed: a Preisach model fitted to these recordings describes them, but the given one does not: the
+            device is in another condition (load, configuration, zero). Its output is shifted by
+            {shift:.2g}{in_y} on average, its gain differs by {gain:+.1f} %, and its shape by {left:.2g}{in_y}
+            rms. Identify it again in this condition
+        reversed: the {output} falls where the model rises: {times:.3f} times what the model says, and an
+            offset, leave {left:.2g}{in_y} rms. The sensor or the coil is connected the wrong way round, or
+            the model is of another device. Identify it again
+        each: the model as given is off by {given:.2g} % of the span (rms); against it the {output} is shifted
+            by {shift:+.2g}{in_y} on average and has {times:.3f} times the gain
+    """)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Offset and gain of the second record, then those of each later one, by its number."""
@@ -83,12 +76,7 @@ class ConditionChange(Cause):
         return (*self.parameters, *more)
 
     def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
-        """Return all of them."""
         return parameters
-
-    def sign(self, name: str, polarity: int) -> int:
-        """Return that of the same parameter of the second record."""
-        return super().sign(name.partition(" ")[0], polarity)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         tried = np.diag(np.tile((_TRIED * frames[0].span, _TRIED), len(frames) - 1)).tolist()

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, spread
 
 _TRIED = 0.03  # amplitude
 _FASTEST_S = 0.1  # the fastest middle time constant
@@ -77,9 +77,9 @@ class Creep(OfKinds):
 
     def _crept(self, y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
         """Creep with a share ``middle`` of its amplitude in the middle time constant."""
-        slow = middle * low_pass(y, values[1], frame.dt_s, frame.past, "creep")
+        slow = middle * frame.low_pass(y, values[1], "creep")
         outer = _DECADES if self.kind == _FIVE else _RATIOS
         for ratio in outer if middle < _ALONE else ():
-            part = low_pass(y, values[1] * ratio, frame.dt_s, frame.past, f"creep {ratio:g}")
+            part = frame.low_pass(y, values[1] * ratio, f"creep {ratio:g}")
             slow = slow + (1.0 - middle) / len(outer) * part
         return np.asarray((y + values[0] * slow) / (1.0 + values[0]))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 _SHARE = 0.02  # of the input's range: a driver with a smaller error is good enough
@@ -26,9 +24,9 @@ class CurrentTracking(OfTheRecord):
     family = "current-tracking"
     blinded_by = ("clipped-input",)  # what its recorder does not see is no fault of the driver
     size = "from the {input} to its reference; one sample in a hundred is further off"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": "one sample in a hundred of the input is {worst:.3g}{in_u} or more away from its reference"
-    }
+    texts = sentences(
+        "gate: one sample in a hundred of the input is {worst:.3g}{in_u} or more away from its reference"
+    )
 
     def gate(self, raw: Raw) -> Firing | None:
         """Input and reference apart by more than a share of the range."""

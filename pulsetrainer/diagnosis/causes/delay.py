@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, remember, remembered
+from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
 
 
 class Delay(Late):
@@ -32,11 +32,11 @@ class Delay(Late):
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005, "by which the {output} is late"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        before = remembered(frame.past, self.id, y[:0])
+        before = frame.remembered(self.id, y[:0])
         steps = values[0] / frame.dt_s
         late = math.ceil(steps)
         whole = np.concatenate((before, y)) if len(before) else y
-        remember(frame.past, self.id, whole[-late - 1 :])
+        frame.remember(self.id, whole[-late - 1 :])
         if late == 0:
             return y
         still = min(max(late - len(before), 0), len(y))  # of these nothing has arrived but the first value

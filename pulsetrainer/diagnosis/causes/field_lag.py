@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, low_pass
+from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
 
 
 class FieldLag(Late):
@@ -20,4 +20,4 @@ class FieldLag(Late):
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),)
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return low_pass(u, values[0], frame.dt_s, frame.past, self.id)
+        return frame.low_pass(u, values[0], self.id)

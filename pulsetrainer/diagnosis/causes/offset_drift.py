@@ -4,21 +4,18 @@ Drifts slow down as a device warms up, or grow, and most of that happens near on
 bend adds is zero at both ends of a record (0 to T), so the rate is the mean rate from end to end. If the
 drift falls by 1/e in the time 1/k, the bend is that of an exponential, with the same size in the middle. This
 finer formula is used only where noise cannot make the difference (`stages.exchange`): a slowing that is not
-there would move the zero.
-
-The search for causes refits the weights, which absorb much of a drift that is over soon. No record can then
-distinguish it from another zero, but the model as given can (`given_drift`).
+there would move the zero. A drift that is over soon, the model as given tells (`given_drift`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Sequence
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.thresholds import TINY
 
 _TRIED = 0.01  # of the span over the record
@@ -60,18 +57,14 @@ class OffsetDrift(Cause):
     )
     lasting = False
     corrects = True
-    texts: ClassVar[Mapping[str, str]] = {
-        "against given": (
-            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
-            "from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide "
-            "some of the drift"
-        ),
-        "against given, nothing left": (
-            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
-            "from that, the model leaves no more than noise. Weights refitted to these recordings hide some "
-            "of the drift"
-        ),
-    }
+    texts = sentences("""
+        against given: relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y};
+            apart from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings
+            hide some of the drift
+        against given, nothing left: relative to the model as given, the zero of the {output} moves by
+            {moved:+.2g}{in_y}; apart from that, the model leaves no more than noise. Weights refitted to
+            these recordings hide some of the drift
+    """)
 
     def __init__(self, count: int = _PLAIN) -> None:
         self._count = count

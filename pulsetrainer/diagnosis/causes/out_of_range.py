@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
+from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
-from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw
+from pulsetrainer.diagnosis.evidence import sentences
+from pulsetrainer.diagnosis.raw import Firing, Raw
 
 _SLACK = 0.01  # of the range: noise may carry an input this far beyond the end
 _LEFT_OVER = 0.25  # of the samples with weight: a mask must leave at least this share
@@ -25,12 +24,10 @@ class OutOfRange(OfTheRecord):
     order = 5
     family = "out-of-range"
     size = "beyond the range of the model, at most"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": (
-            "the {input} leaves {low:.4g} .. {high:.4g}{in_u} in {count:.0f} of its samples, "
-            "by up to {beyond:.3g}{in_u}"
-        )
-    }
+    texts = sentences("""
+        gate: the {input} leaves {low:.4g} .. {high:.4g}{in_u} in {count:.0f} of its samples, by up to
+            {beyond:.3g}{in_u}
+    """)
 
     def gate(self, raw: Raw) -> Firing | None:
         """Input beyond the range; what it leaves in the memory lasts until the other end is reached."""

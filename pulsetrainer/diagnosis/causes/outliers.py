@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 import scipy  # its parts load when they are first used
-from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.wild import isolated
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import TINY
 
@@ -44,9 +41,9 @@ class Outliers(OfTheRecord):
     corrects = True
     wild = True
     size = "from the worst sample to those around it"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} isolated samples differ from those around them by more than {limit:.3g}{in_y}"
-    }
+    texts = sentences(
+        "gate: {count:.0f} isolated samples differ from those around them by more than {limit:.3g}{in_y}"
+    )
 
     def gate(self, raw: Raw) -> Firing | None:
         """Samples far from the median around them, farther than fast turns go."""
@@ -101,7 +98,7 @@ def _comes_back(u: FloatArray) -> FloatArray:
     return np.asarray(way - swing)
 
 
-def _hurries(u: FloatArray) -> NDArray[np.bool_]:
+def _hurries(u: FloatArray) -> BoolArray:
     """Whether an input (n,) moves far faster beside a sample than near it: a short ramp between rests.
 
     A force that follows the speed comes and goes with it.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, low_pass
+from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
 
 
 class OutputLag(Late):
@@ -25,4 +25,4 @@ class OutputLag(Late):
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return np.apply_along_axis(low_pass, 0, y, values[0], frame.dt_s, frame.past, self.id)
+        return np.apply_along_axis(frame.low_pass, 0, y, values[0], self.id)

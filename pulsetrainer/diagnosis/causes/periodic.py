@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 if TYPE_CHECKING:
@@ -51,9 +52,9 @@ class Periodic(Cause):
     lasting = False
     corrects = True
     line = True
-    texts: ClassVar[Mapping[str, str]] = {
-        "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: reported, but not a verdict")
-    }
+    texts = sentences(
+        "background: a hum at {frequency:.4g} Hz, no larger than the noise: reported, but not a verdict"
+    )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return a phase for each record, since no clock runs through all of them, and one frequency."""
@@ -76,10 +77,6 @@ class Periodic(Cause):
         size = _TRIED * frame.span
         strengths = size * np.eye(2 * frame.records)
         return [[(*row.tolist(), best) for row in strengths]]
-
-    def sign(self, name: str, polarity: int) -> int:
-        """Return by what a parameter is multiplied when the output is; of later records it has a number."""
-        return super().sign(name.partition(" ")[0], polarity)
 
     def is_background(self, sizes: Sequence[float], floor: Floor) -> bool:
         """Return whether it is a hum of the noise's size."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.core.censored import between_steps
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -35,12 +36,10 @@ class Quantisation(OfTheRecord):
     corrects = True
     leaves = ("saturation", "stick-slip")
     size = "of one step of the {output}"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span",
-        "background": (
-            "steps of {size:.4g}{in_y}, which the noise averages out: reported, but not a verdict"
-        ),
-    }
+    texts = sentences("""
+        gate: the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span
+        background: steps of {size:.4g}{in_y}, which the noise averages out: reported, but not a verdict
+    """)
 
     def gate(self, raw: Raw) -> Firing | None:
         """Distinct values that are far apart, and come again."""

@@ -8,7 +8,7 @@ from math import atan, tan, tanh
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 _TRIED = (0.005, 0.015)  # of the root of the range: coefficients tried
 _NONE = 3e-8  # of the root of range and time step: a smaller coefficient widens nothing
@@ -39,13 +39,13 @@ class RateWidening(Cause):
         k = values[0]
         if k <= _NONE * (frame.reach * frame.dt_s) ** 0.5:
             return u
-        begun, inner = remembered(frame.past, self.id, np.repeat(u[:1], 2)).tolist()
-        if frame.past is not None and frame.past.before:
+        begun, inner = frame.remembered(self.id, np.repeat(u[:1], 2)).tolist()
+        if not frame.is_first:
             u = np.append(begun, u)
         path = u.copy()
         path[0] = inner
         path[1:] -= _excess(u, u[0] - inner, k, frame.dt_s)
-        remember(frame.past, self.id, np.asarray([u[-1], path[-1]]))
+        frame.remember(self.id, np.asarray([u[-1], path[-1]]))
         return path[-frame.input.size :]
 
 

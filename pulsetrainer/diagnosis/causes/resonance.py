@@ -10,7 +10,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 _TRIED_Hz = (3.0, 80.0, 20)  # frequencies: from, to, how many
 _TRIED_DAMPING = (0.07, 0.25)  # one that rings for long, and one that rings shortly
@@ -52,9 +52,9 @@ class Resonance(Cause):
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         b, a = _filter(*values, frame.dt_s)
         at_first = np.multiply.outer(scipy.signal.lfilter_zi(b, a), y[0])
-        state = remembered(frame.past, self.id, at_first)
+        state = frame.remembered(self.id, at_first)
         moved, state = scipy.signal.lfilter(b, a, y, axis=0, zi=state)
-        remember(frame.past, self.id, state)
+        frame.remember(self.id, state)
         return np.asarray(moved)
 
 

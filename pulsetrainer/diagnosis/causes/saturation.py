@@ -8,17 +8,15 @@ clipping, the output stays at one level within its noise, while the model as giv
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.censored import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
-from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.evidence import sentences
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, runs_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
@@ -57,16 +55,12 @@ class Saturation(OfTheRecord):
     family = "saturation"
     corrects = True
     size = "{output} at which it is clipped"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} samples sit at exactly {rail:.4g}{in_y}: the output is clipped there",
-        "held": (
-            "{count:.0f} samples stay within their noise at {rail:.4g}{in_y} where the model as given goes on"
-            " to {said:.4g}{in_y}: the output is clipped there, before it is digitised"
-        ),
-        "both": (
-            "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}{in_y}: the output is clipped there"
-        ),
-    }
+    texts = sentences("""
+        gate: {count:.0f} samples sit at exactly {rail:.4g}{in_y}: the output is clipped there
+        held: {count:.0f} samples stay within their noise at {rail:.4g}{in_y} where the model as given goes on
+            to {said:.4g}{in_y}: the output is clipped there, before it is digitised
+        both: {count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}{in_y}: the output is clipped there
+    """)
 
     def gate(self, raw: Raw) -> Firing | None:
         """Extremes that repeat exactly far more often than the values just inside them, at either end."""
@@ -124,10 +118,8 @@ def _beside(at: BoolArray) -> FloatArray:
 
 def _stops_at_once(raw: Raw, y: FloatArray, at: BoolArray, step: float) -> bool:
     """Whether an output (n,) runs into its upper end in most of the strokes that leave it there."""
-    u, edges = raw.record.input, np.diff(at.astype(np.int8), prepend=0, append=0)
-    told = []
-    begins, ends = (np.flatnonzero(edges == way).tolist() for way in (1, -1))
-    for begin, end in zip(begins, ends, strict=True):
+    u, told = raw.record.input, []
+    for begin, end in runs_of(at):
         on = u[begin:end] - u[begin]
         way = np.sign(u[begin] - u[max(begin - _LEAST, 0)])
         travel = float((way * on).max())

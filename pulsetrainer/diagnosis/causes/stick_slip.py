@@ -14,18 +14,17 @@ Astrophysical Journal 263, 1982). Errors of the levels are periodic too, but far
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
+from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, evenly, noise_of
 from pulsetrainer.diagnosis.thresholds import TINY
 
@@ -81,10 +80,10 @@ class StickSlip(OfTheRecord):
     blinded_by = ("saturation",)
     doubted = True
     size = "of a typical jump of the {output}"
-    texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} jumps of about {size:.3g}{in_y} between flat stretches in slow motion",
-        "left": "the output moves in jumps of about {size:.3g}{in_y}, whatever the rate",
-    }
+    texts = sentences("""
+        gate: {count:.0f} jumps of about {size:.3g}{in_y} between flat stretches in slow motion
+        left: the output moves in jumps of about {size:.3g}{in_y}, whatever the rate
+    """)
 
     def gate(self, raw: Raw) -> Firing | None:
         """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
@@ -95,12 +94,12 @@ class StickSlip(OfTheRecord):
             return None
         moved = _jumps(record.output, wide)
         size = np.abs(moved)
-        around = scipy.ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
+        rate = scipy.ndimage.uniform_filter1d(np.gradient(record.input, dt_s), _RATE * wide) / raw.reach
         noise = np.sqrt(2.0 / wide) * noise_of(record.output)
-        least = _SIGMAS * np.maximum(_spread(moved, record, dt_s, wide, raw.reach), noise)
+        least = _SIGMAS * np.maximum(_spread(moved, record.output, np.abs(rate), wide), noise)
         peak = (size == scipy.ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
         broken = replace(raw, record=record, stamps=None).beside_breaks(_APART * wide)
-        found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around) & ~broken
+        found = _slow(rate, wide) & peak & (size > _SHARPER * _around(size, wide)) & ~broken
         count = np.count_nonzero(found)
         if count < _JUMPS:
             return None
@@ -147,30 +146,32 @@ def _jumps(y: FloatArray, wide: int) -> FloatArray:
     return jump
 
 
-def _spread(moved: FloatArray, record: Record, dt_s: float, wide: int, reach: float) -> FloatArray:
+def _around(jumps: FloatArray, wide: int) -> FloatArray:
+    """Median (n,) of the jumps around each sample."""
+    return scipy.ndimage.median_filter(jumps[::wide], _AROUND, mode="nearest").repeat(wide)[: jumps.size]
+
+
+def _spread(moved: FloatArray, output: FloatArray, speed: FloatArray, wide: int) -> FloatArray:
     """Standard deviation (n,) of the differences of two means by noise alone, whatever its colour and level.
 
     At rest the output does not stick; where no rest is at a level, it is the slow samples that change least.
     """
-    rate = np.abs(scipy.ndimage.uniform_filter1d(np.gradient(record.input, dt_s), _RATE * wide)) / reach
-    usual = scipy.ndimage.median_filter(moved[::wide], _AROUND, mode="nearest").repeat(wide)[: moved.size]
-    apart = np.abs(moved - usual)
-    level = scipy.ndimage.uniform_filter1d(record.output, wide)
+    apart = np.abs(moved - _around(moved, wide))
+    level = scipy.ndimage.uniform_filter1d(output, wide)
     edges = np.quantile(level, np.linspace(0.0, 1.0, _LEVELS + 1))
     group = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
     spread = np.zeros(_LEVELS)
     for k in range(_LEVELS):
         own = group == k
-        for part, share in ((own & (rate < _REST), 0.5), (own & (rate < _RATES[1]), _QUIET), (own, _QUIET)):
+        for part, share in ((own & (speed < _REST), 0.5), (own & (speed < _RATES[1]), _QUIET), (own, _QUIET)):
             if np.count_nonzero(part) >= _ENOUGH * wide:
                 spread[k] = float(np.quantile(apart[part], share)) / scipy.stats.norm.ppf(0.5 + 0.5 * share)
                 break
     return spread[group]
 
 
-def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
-    """Whether the input moves slowly and evenly at each sample (n,)."""
-    rate = scipy.ndimage.uniform_filter1d(np.gradient(u, dt_s), _RATE * wide) / reach
+def _slow(rate: FloatArray, wide: int) -> FloatArray:
+    """Whether the input moves slowly and evenly at each sample (n,), by its rate."""
     moved = np.abs(rate)
     # both sides: between two rests a short ramp is no even motion, and all of it looks like a jump
     change = np.max([np.abs(np.roll(rate, side * _APART * wide) - rate) for side in (-1, 1)], axis=0)

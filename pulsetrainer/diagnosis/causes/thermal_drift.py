@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, spread
 
 _TRIED = 0.02  # coefficient
 _FASTEST_S = 5.0  # that of a wire: anything faster is creep
@@ -104,9 +104,9 @@ class ThermalDrift(OfKinds):
     def _weakened(self, y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
         """Output of a coil whose heat begins at ``begin``."""
         squared = self._power(frame)
-        if frame.past is None or not frame.past.before:  # the first sample already heats
+        if frame.is_first:  # the first sample already heats
             squared = np.append(begin, squared)
-        heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
+        heat = frame.low_pass(squared, values[1], "heat")[-y.size :]
         about = frame.zero + self.kind * (frame.ends[1] - frame.ends[0])
         coefficient, _, *shift = values
         return np.asarray(y - heat * (coefficient * (y - about) - sum(shift)))

@@ -15,15 +15,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import (
-    Cause,
-    Frame,
-    Quantity,
-    Values,
-    low_pass,
-    remember,
-    remembered,
-)
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.finding import Estimate
@@ -50,13 +42,9 @@ class State:
 
 def _speed(x: FloatArray, frame: Frame, name: str) -> FloatArray:
     """Absolute rate (n,) of a signal."""
-    before = remembered(frame.past, f"{name} last", x[:1])
-    remember(frame.past, f"{name} last", x[-1:])
+    before = frame.remembered(f"{name} last", x[:1])
+    frame.remember(f"{name} last", x[-1:])
     return np.asarray(np.abs(np.diff(x, prepend=before)) / frame.dt_s)
-
-
-def _lagged(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
-    return low_pass(x, tau, frame.dt_s, frame.past, name)
 
 
 def _above(frame: Frame) -> FloatArray:
@@ -65,11 +53,11 @@ def _above(frame: Frame) -> FloatArray:
 
 def _since(event: FloatArray, frame: Frame, name: str) -> FloatArray:
     """Time (n,) since the last sample with an event (n,)."""
-    start = float(remembered(frame.past, f"{name} since", np.full(1, np.inf))[0])
+    start = float(frame.remembered(f"{name} since", np.full(1, np.inf))[0])
     place = np.arange(event.size)
     last = np.maximum.accumulate(np.where(event, place, -1))
     since = np.where(last >= 0, (place - last) * frame.dt_s, start + (place + 1) * frame.dt_s)
-    remember(frame.past, f"{name} since", since[-1:])
+    frame.remember(f"{name} since", since[-1:])
     return np.asarray(since)
 
 
@@ -77,13 +65,13 @@ def _moves(frame: Frame) -> FloatArray:
     """Whether the input has left the band that it rested in, at each sample (n,)."""
     if "moves" in frame.kept:
         return frame.kept["moves"]
-    at, width = float(remembered(frame.past, "unlisted band", frame.input[:1])[0]), _STILL * frame.reach
+    at, width = float(frame.remembered("unlisted band", frame.input[:1])[0]), _STILL * frame.reach
     moved = []
     for value in frame.input.tolist():
         moves = abs(value - at) > width
         at = value if moves else at
         moved.append(moves)
-    remember(frame.past, "unlisted band", np.asarray([at]))
+    frame.remember("unlisted band", np.asarray([at]))
     return frame.kept.setdefault("moves", np.asarray(moved))
 
 
@@ -95,7 +83,7 @@ def _turns(frame: Frame) -> tuple[FloatArray, FloatArray]:
     first = frame.input[0]
     # as the memory begins: the input came down through all of its range, and then to the first sample
     before = [frame.low, first, 1.0] if first > frame.low + width else [frame.low + frame.reach, first, -1.0]
-    turn, extreme, way = remembered(frame.past, "unlisted turn", np.asarray(before)).tolist()
+    turn, extreme, way = frame.remembered("unlisted turn", np.asarray(before)).tolist()
     turns, new = [], []
     for value in frame.input.tolist():
         back = (extreme - value) * way
@@ -105,31 +93,27 @@ def _turns(frame: Frame) -> tuple[FloatArray, FloatArray]:
             extreme = value
         turns.append(turn)
         new.append(back > width)
-    remember(frame.past, "unlisted turn", np.asarray([turn, extreme, way]))
+    frame.remember("unlisted turn", np.asarray([turn, extreme, way]))
     frame.kept.update(turns=np.asarray(turns) - frame.low, turned=np.asarray(new))
     return frame.kept["turns"], frame.kept["turned"]
 
 
 def _reverses(frame: Frame) -> FloatArray:
     """Whether the input moves the other way than when it last moved, at each sample (n,)."""
-    before = remembered(frame.past, "unlisted moved", np.append(frame.input[:1], 0.0))
+    before = frame.remembered("unlisted moved", np.append(frame.input[:1], 0.0))
     way = np.sign(np.diff(frame.input, prepend=before[0]))
     last = np.maximum.accumulate(np.where(way != 0.0, np.arange(way.size), -1))
     way = np.where(last >= 0, way[last], before[1])
-    remember(frame.past, "unlisted moved", np.append(frame.input[-1:], way[-1:]))
+    frame.remember("unlisted moved", np.append(frame.input[-1:], way[-1:]))
     return np.asarray(way != np.append(before[1], way[:-1]))
 
 
-def _squared(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
-    return _lagged(x**2, tau, frame, name)
-
-
 def _rate(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
-    return _lagged(_speed(x, frame, name), tau, frame, name)
+    return frame.low_pass(_speed(x, frame, name), tau, name)
 
 
 def _change(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
-    return x - _lagged(x, tau, frame, name)
+    return x - frame.low_pass(x, tau, name)
 
 
 def _share(x: FloatArray, tau: float) -> FloatArray:
@@ -138,15 +122,15 @@ def _share(x: FloatArray, tau: float) -> FloatArray:
 
 STATES: tuple[State, ...] = (
     State("input", "{u}", "the average {input} of the last {tau}",
-          lambda _, s, f, n: _lagged(_above(f), s, f, n)),
+          lambda _, s, f, n: f.low_pass(_above(f), s, n)),
     State("output", "{y}", "the average {output} of the last {tau}",
-          lambda y, s, f, n: _lagged(y - f.zero, s, f, n)),
+          lambda y, s, f, n: f.low_pass(y - f.zero, s, n)),
     State("input squared", "({u})^2",
           "the average square of the {input}, from its low end, of the last {tau}",
-          lambda _, s, f, n: _squared(_above(f), s, f, n)),
+          lambda _, s, f, n: f.low_pass(_above(f) ** 2, s, n)),
     State("output squared", "({y})^2",
           "the average square of the {output}, from its lowest, of the last {tau}",
-          lambda y, s, f, n: _squared(y - f.zero, s, f, n)),
+          lambda y, s, f, n: f.low_pass((y - f.zero) ** 2, s, n)),
     State("input rate", "{u}/s", "the average speed of the {input} in the last {tau}",
           lambda _, s, f, n: _rate(f.input, s, f, n)),
     State("output rate", "{y}/s", "the average speed of the {output} in the last {tau}",
@@ -156,9 +140,9 @@ STATES: tuple[State, ...] = (
     State("output change", "{y}", "the {output} less its average of the last {tau}",
           lambda y, s, f, n: _change(y - f.zero, s, f, n)),
     State("way", "{u}", "the distance of the {input} from its last turn, averaged over the last {tau}",
-          lambda _, s, f, n: _lagged(np.abs(_above(f) - _turns(f)[0]), s, f, n)),
+          lambda _, s, f, n: f.low_pass(np.abs(_above(f) - _turns(f)[0]), s, n)),
     State("turn", "{u}", "the {input} at its last turn, averaged over the last {tau}",
-          lambda _, s, f, n: _lagged(_turns(f)[0], s, f, n)),
+          lambda _, s, f, n: f.low_pass(_turns(f)[0], s, n)),
     State("since turn", "1", "the time since the last turn of the {input}",
           lambda _, s, f, n: _share(_since(_turns(f)[1], f, n), s), saturates=True),
     State("rest", "1", "the time that the {input} has rested",
@@ -261,11 +245,9 @@ class Unlisted(Cause):
         return ()
 
     def sign(self, name: str, polarity: int) -> int:
-        """Return by what a parameter is multiplied when the output is: the curve is added to it."""
-        return polarity if name.startswith("f") else 1
+        return polarity if name.startswith("f") else 1  # a curve that is added to the output
 
     def restored(self, values: Values) -> tuple[Cause, Values]:
-        """Return the cause with its states, and its parameters, for the constants and parameters kept."""
         count = len(values) // (_CONSTANTS + KNOTS)
         kept = np.reshape(values[: _CONSTANTS * count], (count, _CONSTANTS))
         parts = [Part.decoded(*one) for one in kept.tolist()]

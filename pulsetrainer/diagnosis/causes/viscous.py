@@ -12,17 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import (
-    Cause,
-    Frame,
-    OfKinds,
-    Quantity,
-    Values,
-    low_pass,
-    remember,
-    remembered,
-    sampled,
-)
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, low_pass, sampled
 
 _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
@@ -73,10 +63,10 @@ class Viscous(OfKinds):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         # the rate before the sample, not around it: at a turn the output jumps after the turn
-        before = remembered(frame.past, self.id, frame.input[:1])
-        remember(frame.past, self.id, frame.input[-1:])
+        before = frame.remembered(self.id, frame.input[:1])
+        frame.remember(self.id, frame.input[-1:])
         speed = np.diff(frame.input, prepend=before) / frame.dt_s
-        return y + values[0] * low_pass(self._power(speed), values[1], frame.dt_s, frame.past, self.id)
+        return y + values[0] * frame.low_pass(self._power(speed), values[1], self.id)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         around = np.gradient(frame.input, frame.dt_s)

@@ -22,8 +22,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.diagnosis.causes.base import Frame
-from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.moments import profile
@@ -51,7 +49,8 @@ def stage(state: State) -> State:
         frames = state.problem.frames
         if not all(t.cause.can_be_told(t.values, frames) for t in accepted.terms):
             continue
-        if any(_ran_away(t, frames[0]) for t in accepted.terms):
+        at_bounds = [t.at_bounds(frames[0]) for t in accepted.terms]
+        if any(len(one) > 1 and all(one) for one in at_bounds):
             continue
         return replace(
             state,
@@ -61,13 +60,6 @@ def stage(state: State) -> State:
             trials=(),
         )
     return replace(state, trials=())
-
-
-def _ran_away(term: Term, frame: Frame) -> bool:
-    """Whether a term has several parameters, and all of them lie at their bounds."""
-    bounds = term.cause.quantities(frame)
-    at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
-    return len(at_end) > 1 and all(at_end)
 
 
 def _fall(state: State, trial: Fitted) -> float:

@@ -19,8 +19,8 @@ import numpy as np
 
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.intervals import estimates_of
 from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.stages.parameters import estimates_of
 from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -36,9 +36,7 @@ def stage(state: State) -> State:
             kept = trial
     if kept is state.current:
         return replace(state, repeated_estimates=state.estimates)
-    known = estimates_of(kept, state.scores, state.held_out, state.floor)
-    told = {name: tuple(state.scale.estimate(one) for one in rows) for name, rows in known.items()}
-    told = {**told, **state.by_contrast}
+    told = state.in_its_units(estimates_of(kept, state.scores, state.held_out, state.floor))
     findings = tuple(_told_by_both(one, told.get(one.cause.id, ())) for one in state.findings)
     told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
     return replace(state, repeated=kept, repeated_estimates=told, findings=findings)

@@ -13,20 +13,19 @@ differ by more than twice what noise, and what happens between two samples, can 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.causes.creep import Creep
-from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
+from pulsetrainer.diagnosis.stages.parameters import estimates_of
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -73,7 +72,7 @@ def _one_creep(state: State) -> State:
     current, frame = state.current, state.problem.frames[0]
     creeps = {term: as_late(term, frame) for term in current.terms if not isinstance(term.cause, Creep)}
     several = [term for term, one in creeps.items() if one]
-    if len(several) == 1 or Creep.id in current.names or not several:
+    if len(several) < 2 or Creep.id in current.names:
         return state
     others = tuple(term for term in current.terms if term not in several)
     trials = [refit(state.problem, (*others, *creeps[term]), current) for term in several]
@@ -83,12 +82,6 @@ def _one_creep(state: State) -> State:
     p_values = {name: p for name, p in state.p_values.items() if name in best.names}
     p_values[Creep.id] = min(state.p_values[term.cause.id] for term in several)
     return replace(state, current=settled(state.problem, best), p_values=p_values)
-
-
-def _told_apart(state: State, trials: Sequence[Fitted]) -> list[Fitted]:
-    """Return the fits whose squares are lower than neither noise nor what lies between samples can make."""
-    noise, squares = state.scores.noise, state.current.squares
-    return [one for one in trials if squares - one.squares > doubt(state.current, one, noise)]
 
 
 def _exchanged(state: State, cause: Cause) -> State:
@@ -105,7 +98,10 @@ def _exchanged(state: State, cause: Cause) -> State:
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
-    trials += _told_apart(state, [refit(problem, (*without.terms, one), without) for one in late])
+    for one in late:
+        trial = refit(problem, (*without.terms, one), without)
+        if current.squares - trial.squares > doubt(current, trial, state.scores.noise):
+            trials.append(trial)
     best = min((current, *trials), key=lambda fitted: fitted.squares)
     if best is current:
         return state

@@ -48,7 +48,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import given_drift, velocity
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import settled
-from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, follows, is_near, left_by
+from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, follows, left_by
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
@@ -70,10 +70,8 @@ def stage(state: State) -> State:
     if not state.question.timed:
         told = tuple(c.id for c in library().values() if c.stage != "record" and not c.needs_time)
         said.append(Evidence("untimed", names=told))
-    span = state.scale.span
-    noise = span * state.floor_left.noise
-    for record, one in whole_and_each(judged, state):
-        turned = condition_change.turned_over(one.measured, one.predicted, noise)
+    for record, one in whole_and_each(judged):
+        turned = condition_change.turned_over(one.measured, one.predicted, one.noise)
         if turned is not None and turned.left < one.speed.velocity:
             state, more = _in_another_condition(withdrawn(state), turned, judged.polarity, record)
             return replace(state, evidence=(*said, *more, *state.evidence))
@@ -86,9 +84,9 @@ def stage(state: State) -> State:
         blind = state.blind and state.lacks and not state.question.quick
         if state.verdict == "none" and (_unexplained(state, judged) or blind):
             state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
-    changed = _changed(state, judged, noise)
+    changed = _changed(state, judged)
     if changed is not None:
-        state, more = _of_a_change(state, judged, changed, noise)
+        state, more = _of_a_change(state, judged, changed)
         said += more
     said += _not_carried(state, judged) if changed is None else []
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
@@ -96,25 +94,23 @@ def stage(state: State) -> State:
     return replace(state, evidence=(*said, *state.evidence))
 
 
-def _changed(state: State, judged: Judged, noise_rms: float) -> Change | None:
+def _changed(state: State, judged: Judged) -> Change | None:
     """Return how the device changed since its model was made; None if it did not, or if nothing shows it."""
     assert state.question.given is not None
     fit = state.question.given.model.fit
     if judged.speed.wrong or (fit is not None and fit.warning):
         return None
     refitted = state.scale.span * state.baseline.rms
-    changed = against_model(judged.measured, judged.predicted, refitted, noise_rms)
+    changed = against_model(judged.measured, judged.predicted, refitted, judged.noise)
     # what lay outside the range, and stays switched, looks like another zero
     outside = any(one.cause == OutOfRange.id for _, one in state.firings)
     return None if changed is not None and changed.kind == "shifted" and outside else changed
 
 
-def _of_a_change(
-    state: State, judged: Judged, changed: Change, noise_rms: float
-) -> tuple[State, list[Evidence]]:
+def _of_a_change(state: State, judged: Judged, changed: Change) -> tuple[State, list[Evidence]]:
     """Decide what a difference between the device and the model as given may be."""
     if all(_is_one_stroke(one.input) for one in judged.records):
-        given = left_by(judged.measured, judged.predicted, noise_rms) / changed.span
+        given = judged.left_by(judged.predicted) / changed.span
         nothing = state.verdict == "none"
         said = Evidence("one stroke", figures={"given": PERCENT * given})
         return (replace(state, verdict="inconclusive") if nothing else state), [said]
@@ -122,9 +118,9 @@ def _of_a_change(
         nothing = state.verdict in ("none", "inconclusive")
         state = replace(state, verdict="unknown") if nothing else state
         return state, _not_carried(state, judged)
-    if _brought_near(state, judged, noise_rms):
+    if _brought_near(state, judged):
         return state, []
-    return _drifted(state, judged, changed, noise_rms) or _far_off(state, judged, changed, noise_rms)
+    return _drifted(state, judged, changed) or _far_off(state, judged, changed)
 
 
 def _is_one_stroke(u: FloatArray) -> bool:
@@ -168,7 +164,7 @@ def _each_against(judged: Judged) -> Iterator[Evidence]:
         yield Evidence("each", _CHANGED, figures, record=k)
 
 
-def _brought_near(state: State, judged: Judged, noise_rms: float) -> bool:
+def _brought_near(state: State, judged: Judged) -> bool:
     """Whether the causes found, added to the prediction of the model as given, describe the records."""
     found = {one.cause.id for one in state.findings if one.found and not one.in_doubt}
     terms = [term for term in state.current.terms if term.cause.id in found]
@@ -177,14 +173,12 @@ def _brought_near(state: State, judged: Judged, noise_rms: float) -> bool:
     said = judged.predicted + judged.kept(added(state, terms))
     if Unlisted.id in found:  # a learned curve is known but for a constant
         said = said + np.mean(judged.measured - said)
-    return is_near(judged.measured, said, noise_rms)
+    return judged.is_near(said)
 
 
-def _drifted(
-    state: State, judged: Judged, changed: Change, noise_rms: float
-) -> tuple[State, list[Evidence]] | None:
+def _drifted(state: State, judged: Judged, changed: Change) -> tuple[State, list[Evidence]] | None:
     """Return the state with the drift of the zero that the model as given shows; None if it shows none."""
-    told = given_drift.told(state, judged, changed, noise_rms)
+    told = given_drift.told(state, judged, changed)
     if told is None:
         return None
     finding, fitted = told
@@ -194,10 +188,10 @@ def _drifted(
     return _first(replace(state, current=fitted, repeated=fitted), finding), [finding.seen]
 
 
-def _far_off(state: State, judged: Judged, changed: Change, noise_rms: float) -> tuple[State, list[Evidence]]:
+def _far_off(state: State, judged: Judged, changed: Change) -> tuple[State, list[Evidence]]:
     """Distinguish another condition from a device that refitted weights do not describe either."""
     span, percent = state.scale.span, PERCENT / changed.span
-    given = left_by(judged.measured, judged.predicted, noise_rms)
+    given = judged.left_by(judged.predicted)
     left_out = span * _left_out(state)
     if np.isnan(left_out) or follows(left_out, given):
         return _in_another_condition(state, changed, judged.polarity)
@@ -291,21 +285,15 @@ def _in_another_condition(
             said.append(Evidence("overshadowed", figures=figures, names=gone))
             state = cleared
     if state.verdict != _CHANGED:
-        seen = replace(_evidence(changed, polarity), record=record)
-        said.append(seen)
-        state = _first(state, _finding(changed, polarity, seen))
+        figures = {
+            "shift": polarity * changed.shift,
+            "gain": PERCENT * changed.gain,
+            "times": 1.0 + changed.gain,
+            "left": changed.left,
+        }
+        said.append(Evidence(changed.kind, _CHANGED, figures, record=record))
+        state = _first(state, _finding(changed, polarity, said[-1]))
     return state, said
-
-
-def _evidence(changed: Change, polarity: int) -> Evidence:
-    """Return what a changed condition looks like."""
-    figures = {
-        "shift": polarity * changed.shift,
-        "gain": PERCENT * changed.gain,
-        "times": 1.0 + changed.gain,
-        "left": changed.left,
-    }
-    return Evidence(changed.kind, _CHANGED, figures)
 
 
 def _finding(changed: Change, polarity: int, seen: Evidence) -> Finding:

@@ -19,9 +19,9 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause, Values
-from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import Score, both_late
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS

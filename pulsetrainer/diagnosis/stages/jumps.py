@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library, taken_out
+from pulsetrainer.diagnosis.causes import library, taken_out, with_gates
 from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import State
@@ -31,8 +31,7 @@ def stage(state: State) -> State:
         return state
     out = taken_out(name for one in state.question.corrected for name in one)
     out |= {firing.cause for _, firing in kept}
-    asked = [one for one in library().values() if one.stage == "record" and one.id not in out]
-    left = [cause.gate_left(state.current) for cause in asked]
+    left = [cause.gate_left(state.current) for cause in with_gates(out)]
     seen = [(0, _in_its_unit(firing, state.scale)) for firing in left if firing is not None]
     steps = LIMITS.steps_apart * max((f.value for _, f in kept if f.cause == "quantisation"), default=0.0)
     larger = [one for one in seen if one[1].value > steps]

@@ -29,10 +29,11 @@ from pulsetrainer.core.memory import State
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.turns import at_their_tips
-from pulsetrainer.diagnosis import gates
+from pulsetrainer.core.wild import repaired
+from pulsetrainer.diagnosis.causes import fired_on
 from pulsetrainer.diagnosis.coarse_input import as_it_moved
 from pulsetrainer.diagnosis.prediction import predict
-from pulsetrainer.diagnosis.raw import Firing, evenly
+from pulsetrainer.diagnosis.raw import Firing, Raw, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
 
@@ -57,10 +58,11 @@ def stage(question: Question) -> Masked:
     second = second_of(question.records, stamps, low, high)
     polarity = 1 if question.given is None else question.given.model.polarity
     corrected = question.corrected or [()] * len(question.records)
-    found = [
-        gates.check(record, low, high, second, times, polarity, known, _said(question, record, times))
-        for record, times, known in zip(question.records, stamps, corrected, strict=True)
+    raws = [
+        Raw(record, low, high, second, times, polarity=polarity, said=_said(question, record, times))
+        for record, times in zip(question.records, stamps, strict=True)
     ]
+    found = [fired_on(raw, known) for raw, known in zip(raws, corrected, strict=True)]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     moved = map(as_it_moved, masked)
     even = [evenly(record, times) for record, times in zip(moved, stamps, strict=True)]
@@ -95,9 +97,6 @@ def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
     for firing in firings:
         if firing.mask is not None:
             weight[firing.mask] = 0.0
-    output, bad = record.output, weight == 0
-    if bad.any() and not bad.all():
-        good = np.flatnonzero(~bad)
-        output = output.copy()
-        output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
+    bad = weight == 0
+    output = record.output if bad.all() else repaired(record.output, bad)
     return replace(record, sample_weight=weight, output=output)

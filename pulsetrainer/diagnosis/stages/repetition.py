@@ -37,7 +37,7 @@ from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.repeats import repeated
+from pulsetrainer.diagnosis.held_out import repeated
 from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, squares_moved
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT

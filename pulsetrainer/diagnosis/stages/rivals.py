@@ -40,12 +40,12 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.accommodation import Accommodation
 from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
-from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.lines import is_a_line
+from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -105,11 +105,11 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         yield IN_STEP
     if _may_be_own_error(state, cause, fall):
         yield OWN_ERROR
-    bounds = cause.quantities(state.problem.frames[0])
-    at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
+    frame = state.problem.frames[0]
+    at_end = term.at_bounds(frame)
     if any(at_end[: cause.strengths]) and not nothing:
         yield STRONGEST
-    elif any(at_end) or _is_cut(state, known, bounds):
+    elif any(at_end) or _is_cut(state, known, cause.quantities(frame)):
         yield AT_BOUND
         if cause.lasting and fall < state.current.squares:
             yield LEAVES_MORE

@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.floor import Floor
-from pulsetrainer.diagnosis.repeats import repeats
+from pulsetrainer.diagnosis.held_out import repeated
 from pulsetrainer.diagnosis.stages import elimination, search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -174,7 +174,7 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
         if _cancel(more, refitted):
             break
         falls = current.squares - trial.squares > max(state.floor.relevant, listed)
-        if not falls or not repeats(state.held_out, current, trial):
+        if not falls or repeated(state.held_out, current, trial) < LIMITS.repeated:
             doubtful = falls and not parts
             break
         parts, values = more, refitted

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, with_gates
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.state import State
@@ -41,7 +41,7 @@ def stage(state: State) -> State:
     found, rest = [one for one in ranked if one.found], [one for one in ranked if not one.found]
     gated = _gated(state)
     fired = {one.cause.id for one in gated}
-    silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
+    silent = [Finding(cause, False) for cause in with_gates(fired)]
     most = state.rms_of(sum(one.explains_percent for one in found) / PERCENT)
     seen = [*gated, *found] if most < LIMITS.matters * state.floor.span else [*found, *gated]
     told = replace(state, findings=tuple(seen))
