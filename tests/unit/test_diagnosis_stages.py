@@ -1883,11 +1883,32 @@ def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
     assert begin._told_by_both(told, second) == told  # it is said once
 
 
+@pytest.mark.parametrize("averaged", [1, 3])
+def test_within_averages_is_all_that_single_samples_have_beyond_them(averaged):
+    """Also where what is fitted holds averages of the samples as measured: nothing else was counted once."""
+    noise = np.random.default_rng(8).standard_normal(60_000)
+    u = np.sin(np.arange(noise.size) / 300.0)
+    even = noise.reshape(-1, averaged).mean(axis=1)
+    record = Record(u[::averaged], even, dt_s=0.01 * averaged)
+    fitted = SimpleNamespace(
+        problem=SimpleNamespace(records=(replace(record, averaged=averaged),), bins=design.bins_of([record])),
+        simulator=SimpleNamespace(full=lambda terms: [np.zeros(even.size)]),
+        terms=(),
+    )
+    state = SimpleNamespace(
+        question=SimpleNamespace(records=[Record(u, noise, dt_s=0.01)]), scale=SimpleNamespace(span=2.0)
+    )
+    in_bins = np.average(fitted.problem.bins.average([even]) ** 2, weights=fitted.problem.bins.sizes)
+    within = extension._within_averages(state, fitted)
+    single = noise.var() * (1.0 - 1.0 / averaged) / 4.0 + even.var()
+    assert within == pytest.approx(single - in_bins, rel=0.02)
+
+
 def _in_use(monkeypatch, within=100.0):
     """The error of a static model that is fitted to the records is 11 of averages, and this within them."""
     monkeypatch.setattr(extension, "percent_of_samples", lambda state: 1.0)
     monkeypatch.setattr(extension, "with_its_offset", lambda state, model, faults: model)
-    monkeypatch.setattr(extension, "_within_averages", lambda fitted: within)
+    monkeypatch.setattr(extension, "_within_averages", lambda state, fitted: within)
 
 
 @pytest.mark.parametrize(

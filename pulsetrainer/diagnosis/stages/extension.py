@@ -30,6 +30,7 @@ from pulsetrainer.diagnosis.artefact import (
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.raw import noise_of
 from pulsetrainer.diagnosis.stages import begin
 from pulsetrainer.diagnosis.stages.repetition import DOUBT
 from pulsetrainer.diagnosis.state import State
@@ -60,7 +61,7 @@ def _extended(state: State, given: Model) -> State:
     # What was fitted in several conditions has a zero for each, which no model has. Else it counts: a model
     # that has the heat already predicts a record that begins warm worse than any other.
     if ConditionChange.id not in state.repeated.names:
-        static = plain.squares / state.floor.count + _within_averages(state.repeated)
+        static = plain.squares / state.floor.count + _within_averages(state, state.repeated)
         beaten = min(beaten, static * state.scale.span**2)
     if beaten - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
@@ -77,12 +78,20 @@ def _extended(state: State, given: Model) -> State:
     return replace(state, repeated=None, evidence=(*state.evidence, said))
 
 
-def _within_averages(fitted: Fitted) -> float:
-    """Mean square of what a fit leaves of single samples beyond what it leaves of their averages."""
-    bins, simulated = fitted.problem.bins, fitted.simulator.full(fitted.terms)
-    left = [record.output - y for record, y in zip(fitted.problem.records, simulated, strict=True)]
+def _within_averages(state: State, fitted: Fitted) -> float:
+    """Mean square of what a fit leaves of samples as measured, beyond what it leaves of their averages.
+
+    The records that are fitted may be averages themselves; within these there is only noise.
+    """
+    records, bins = fitted.problem.records, fitted.problem.bins
+    simulated = fitted.simulator.full(fitted.terms)
+    left = [record.output - y for record, y in zip(records, simulated, strict=True)]
     variance = bins.average([one**2 for one in left]) - bins.average(left) ** 2
-    return float(np.average(variance, weights=bins.sizes))
+    noise = [
+        (1.0 - 1.0 / even.averaged) * noise_of(own.output, own.sample_weight) ** 2
+        for own, even in zip(state.question.records, records, strict=True)
+    ]
+    return float(np.average(variance, weights=bins.sizes) + np.mean(noise) / state.scale.span**2)
 
 
 def _why_not(state: State, better: bool, rest: float) -> str:
