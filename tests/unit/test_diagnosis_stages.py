@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pulsetrainer.artefacts.model import Extension, Model
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import artefact, design, fitting, lines, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
