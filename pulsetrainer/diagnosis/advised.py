@@ -32,11 +32,12 @@ first: Take {removed} out of the recording (pulsetrainer correct), and go on wit
 mains: {mains:.4g} Hz is a frequency of the mains, so a hum is likely.
 extended: Extend the model now (pulsetrainer extend): it then predicts recordings like these better, whether
     it is {either}.
+one rate: At one rate each of them is only a shape of the loop, which the device may have without any of
+    them, and a model that was extended by one may do worse at other rates.
 rate: If the samples were taken at a constant rate, no new recording is needed: read the table again with
     pulsetrainer import --rate HZ.
 faster: A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart).
-    To know what it is, record {experiment}{often}{lasting}, if device and recorder can be so fast. Then
-    diagnose that recording. {command}
+    To know what it is, record {experiment}{often}{lasting}{so_fast}. Then diagnose that recording. {command}
 later: This recording cannot show everything ({lacked}). If that matters to you, {again}
 ours: The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} -o
     diagnostic-2.h5.
@@ -47,9 +48,9 @@ ADVICE: Mapping[str, str] = {
     kind: said.replace("{again}", BESIDE["again"]).replace("{keep}", BESIDE["keep"])
     for kind, said in sentences("""\
 tied, quick: Run the full diagnosis: a quick screen cannot distinguish between {names}.
-tied: To tell {names} apart, record {experiment}{often}{lasting}. There the two most similar causes differ by
-    {there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ by
-    {here:.2g} %. Then diagnose that recording. {command}
+tied: To tell {names} apart, record {experiment}{often}{lasting}{so_fast}. There the two most similar causes
+    differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ
+    by {here:.2g} %. Then diagnose that recording. {command}
 tied, no better: We know of no kind of recording that would tell {names} apart much better than this one, on
     which they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of the
     same kind would help: four times as long halves the noise.
@@ -266,6 +267,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         experiment=EXPERIMENTS[played].format(**numbers),
         often=bench.often(played, faster),
         lasting=bench.lasting(played, faster),
+        so_fast=", if device and recorder can be so fast" if faster > 1.0 and not bench.ours else "",
         missing="; ".join(MISSING[name].format(**bench.numbers()) for name in names if name in MISSING),
         command=BESIDE["ours" if bench.ours else "table"].format(**numbers),
         **{name: bench.time(value) if name in _TIMES else value for name, value in one.figures.items()},
@@ -279,6 +281,8 @@ def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: 
             yield BESIDE["mains"]
         if command == "extend":
             yield BESIDE["extended"]
+        if "one rate" in one.figures:
+            yield BESIDE["one rate"]
         if command == "correct":
             yield BESIDE["whichever" if faults == names else "first"]
         yield ADVICE[one.kind]

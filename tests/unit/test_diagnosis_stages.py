@@ -1543,7 +1543,10 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
         assert said.names == more.get("lacks", ())
     if kind == "tied":
         assert said.names == ("heating", "field-lag", "delay")
-        assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}
+        # at one rate a lag is only another shape of the loop
+        shape = {"one rate": 1.0} if "rates" in more.get("lacks", ()) else {}
+        known = {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}
+        assert said.figures == known | shape
 
 
 @pytest.mark.parametrize("doubts", [(), ("it fits, but does not repeat",)])

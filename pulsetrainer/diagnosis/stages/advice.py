@@ -33,7 +33,7 @@ from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
-from pulsetrainer.diagnosis.residual import LENGTH
+from pulsetrainer.diagnosis.residual import LENGTH, RATES
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -113,6 +113,7 @@ def _of_the_causes(state: State) -> Evidence:
             "here": percent * best.distance_here,
             "faster": best.faster,
             **_at_the_mains(tied),
+            **({"one rate": 1.0} if RATES in state.lacks and tied.cause.widens else {}),
         }
         if best.distance <= LIMITS.worth_recording * best.distance_here:
             return Evidence("tied, no better", figures=figures, names=names)
