@@ -51,10 +51,14 @@ class HeldOut:
         """
         share = self.gain(before, after, floor)
         if share < 0.0:
-            first, second = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
-            of_pieces = _share(first, second, floor)
+            of_pieces = self.gain_of_pieces(before, after, floor)
             return of_pieces if of_pieces > LIMITS.half else share
         return share
+
+    def gain_of_pieces(self, before: Fitted, after: Fitted, floor: Floor) -> float:
+        """The same as ``gain``, by whole pieces of which a little is told."""
+        first, second = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
+        return _share(first, second, floor)
 
     def pieces(self, fitted: Fitted, count: int) -> FloatArray:
         """Sums of squares (count,) on whole pieces of the time, each predicted from the others; or empty.

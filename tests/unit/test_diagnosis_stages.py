@@ -2425,10 +2425,23 @@ def test_a_slow_fault_that_predicts_less_than_half_is_doubted(monkeypatch, name,
     """A step takes a part of what a device of another kind leaves; a cause of the device must repeat."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
-    state = _state(_fit(1.0, name), held_out=HeldOut(gain), estimates={name: ()})
+    state = _state(_fit(1.0, name), held_out=HeldOut(gain), estimates={name: ()}, without={name: _fit(2.0)})
     object.__setattr__(state.current, "residual", np.zeros(3))
     doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
     assert ("predicts little" in doubts) is said
+
+
+@pytest.mark.parametrize(("of_all", "said"), [(0.49, True), (0.51, False)])
+def test_a_step_that_only_whole_pieces_tell_is_doubted_by_whole_pieces(monkeypatch, of_all, said):
+    """It had 95 % of them, and was in doubt since halves, which tell nothing of it, had 36 % of all."""
+    monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
+    held_out = HeldOut(0.36)
+    state = _state(_fit(1.0, "step"), held_out=held_out, estimates={"step": ()}, without={"step": _fit(2.0)})
+    held_out.gain = lambda before, after, floor: -0.1 if before is state.without["step"] else 0.36
+    held_out.gain_of_pieces = lambda before, after, floor: of_all
+    object.__setattr__(state.current, "residual", np.zeros(3))
+    assert (rivals.LITTLE in rivals._doubts(state, state.current.terms[0], 95.0, 1.0)) is said
 
 
 @pytest.mark.parametrize(("sudden", "said"), [("step", "settles"), ("thermal-drift", "may be wear")])
@@ -2436,13 +2449,15 @@ def test_what_settles_speaks_against_a_step_and_wear_against_heat(monkeypatch, s
     """A step that only settles is in doubt; heat keeps its name."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: True)
-    state = _state(_fit(1.0, sudden), held_out=HeldOut(0.9), estimates={sudden: ()})
+    state = _state(
+        _fit(1.0, sudden), held_out=HeldOut(0.9), estimates={sudden: ()}, without={sudden: _fit(2.0)}
+    )
     object.__setattr__(state.current, "residual", np.zeros(3))
     doubts = tuple(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
     assert said in doubts
     assert replace(_finding(sudden, 1.0), doubts=(said,)).in_doubt is (sudden == "step")
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ("creep",))
-    state = replace(state, without={sudden: _fit(2.0)}, p_values={sudden: 0.006})
+    state = replace(state, p_values={sudden: 0.006})
     tied = rivals.stage(state).findings[0].confounded_with  # a gain that wears off is what accommodates
     assert tied == (("creep",) if sudden == "step" else ("creep", "accommodation"))
 
@@ -2505,7 +2520,7 @@ def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, 
     state = _state(Fit(1.0, (_term(name),)))
     object.__setattr__(state.current, "residual", left)
     problem = SimpleNamespace(measured=level, frames=PROBLEM.frames)
-    state = replace(state, problem=problem, estimates={name: ()})
+    state = replace(state, problem=problem, estimates={name: ()}, without={name: _fit(2.0)})
     doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, times * share / 0.3))
     assert ("wanders" in doubts) is (said and name == "step")
 

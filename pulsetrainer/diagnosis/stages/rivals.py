@@ -130,7 +130,12 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     left = residual.wander(state.current.residual, state.problem.measured)
     if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
         yield WANDERS
-    of_all = state.held_out.gain_told(state.baseline, state.current, state.floor)
+    judged = state.held_out
+    of_pieces = (
+        judged.gain(state.without[term.cause.id], state.current, state.floor) < 0.0
+    )  # told by them alone
+    gain_of = judged.gain_of_pieces if of_pieces else judged.gain_told
+    of_all = gain_of(state.baseline, state.current, state.floor)
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
     if wear.is_as_good(state, term):
