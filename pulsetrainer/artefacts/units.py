@@ -23,15 +23,15 @@ _PREFIXED_SYMBOLS = """
     A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol Nm Nmm Vs Ah Wh VA Am
 """
 _BARE_SYMBOLS = """
-    1 % ‰ percent ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
-    counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
+    1 % ‰ percent permille ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev
+    atm counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
 """
 # what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
 # of two letters and more, may be all of it
 _SUFFIXES = """
     s ms us µs ns min h A mA uA nA pA kA V mV uV kV N mN uN nN cN kN Nm mNm T mT m cm mm um µm nm Pa kPa MPa
     GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm
-    deg rad C °C degC K Hz kHz W g kg % percent
+    deg rad C °C degC K Hz kHz W g kg % percent permille Ah mAh Wh mWh kWh
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
 """
 _PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
@@ -45,6 +45,7 @@ _SPELLED = {
         "us": "microsecond microseconds usec micros",
         "min": "min mins minute minutes minuten",
         "h": "hour hours hr hrs stunde stunden",
+        "d": "day days tag tage",
         "V": "volt volts",
         "A": "amp amps ampere amperes",
         "N": "newton newtons",
@@ -161,8 +162,11 @@ def split_unit(heading: str) -> tuple[str, str]:
 
 def _suffixed(heading: str) -> tuple[str, str] | None:
     found = _SUFFIXED.match(heading)
-    told = found and found["unit"] != "second" and _stands_alone(found["unit"])
-    return (found["name"], found["unit"]) if found and told else None
+    if found is None or found["unit"] == "second":
+        return None
+    top, slash, _ = found["unit"].partition("/")
+    per = slash and top in _BEHIND_A_NAME and is_unit(found["unit"])
+    return (found["name"], found["unit"]) if per or _stands_alone(found["unit"]) else None
 
 
 def _compound(heading: str) -> tuple[str, str] | None:
@@ -186,7 +190,7 @@ def _unit_of_a_part(heading: str) -> str:
 
 
 def _stands_alone(text: str) -> bool:
-    return text in _BEHIND_A_NAME or (len(text) > 3 and symbol_of(text) in _BEHIND_A_NAME)
+    return text in _BEHIND_A_NAME or (len(text) > 3 and symbol_of(text) in (*_BEHIND_A_NAME, "d"))
 
 
 def claimed_unit(heading: str) -> str:

@@ -197,8 +197,13 @@ def is_called_time(heading: str) -> bool:
 
 
 def _unit_of_time(table: Table, name: str) -> str:
-    """Return the unit of a column of time, empty where the header says none; ``min`` may be all of it."""
-    alone, unit = symbol_of(table.names[table.index(name)]), table.unit(name)
+    """Return the unit of a column of time, empty where the header says none.
+
+    ``min`` may be all of it, and ``d`` stands behind a name, where it is a unit of no other column.
+    """
+    heading, unit = table.names[table.index(name)], table.unit(name)
+    bare, _, behind = heading.rpartition("_")
+    alone = symbol_of(behind if bare.lower() in _TIME_NAMES else heading)
     return ("" if unit.lower() in _CLOCKS else unit) or (alone if alone in SECONDS else "")
 
 

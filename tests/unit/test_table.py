@@ -814,6 +814,14 @@ def test_time_in_minutes_however_the_heading_says_it(table, heading, named):
     assert "[min" in found.read_as["columns"]
 
 
+@pytest.mark.parametrize("heading", ["t_d", "t [d]", "time_days", "days", "Day", "t/d"])
+def test_time_in_days_however_the_heading_says_it(table, heading):
+    """Behind a name of the time alone a single ``d`` is a unit."""
+    found = run_from_table(table(f"{heading};u;y\n0;1;2\n2;3;4\n").path, **COLUMNS)
+    np.testing.assert_array_equal(found.run.time_s, [0, 2 * 86400])
+    assert "[d" in found.read_as["columns"]
+
+
 @pytest.mark.parametrize(
     ("heading", "told"), [("t/xyz", True), ("t_xyz", True), ("A/B", True), ("t", False), ("x", False)]
 )

@@ -138,10 +138,16 @@ def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, writte
         ("flux_V_s", "flux_V", "s"),
         ("kA_m", "kA", "m"),
         ("Tip_Angle_[deg]", "Tip_Angle", "deg"),
+        ("E_kV/mm", "E", "kV/mm"),
+        ("pressure_kN/m2", "pressure", "kN/m2"),
+        ("Q_mAh", "Q", "mAh"),
+        ("time_days", "time", "days"),
+        ("v_d", "v_d", ""),
+        ("ratio_A/B", "ratio_A/B", ""),
     ],
 )
 def test_a_name_of_a_program_says_a_unit_without_a_slash(heading, name, unit):
-    """``H_kA_m`` was a length; of V and s nobody can tell whether they are multiplied."""
+    """``H_kA_m`` and ``E_kV/mm`` were lengths; of V and s nobody can tell whether they are multiplied."""
     assert split_unit(heading) == (name, unit)
 
 
