@@ -24,6 +24,7 @@ from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.output_name import check_artefact_name
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
+from pulsetrainer.steps.arguments import several
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.one_beat import shape_of
@@ -184,8 +185,7 @@ def invert(pulse: Pulse, model: Model, **options: Any) -> Waveform:  # noqa: D10
 def session(  # noqa: D103
     model: Model, device: Device, *, pulses: str | Shape | Sequence[Pulse] = "normal", **options: Any
 ) -> Session:
-    several = [pulses] if isinstance(pulses, str | Shape) else pulses
-    return _session(model, device, pulses=[_shape(one) for one in several], **options)
+    return _session(model, device, pulses=[_shape(one) for one in several(pulses)], **options)
 
 
 def read_table(
@@ -238,12 +238,14 @@ def read_table(
     >>> run.output.size, run.output_unit
     (7833, 'N')
     """
-    several = [paths] if isinstance(paths, str | Path) else paths
+    files = several(paths)
+    if not files:
+        raise ArgumentError("read_table needs a file, got none", hint="give its name, such as 'a.csv'")
     if input is None or output is None:
         missing = [name for name, column in (("input", input), ("output", output)) if column is None]
         raise ArgumentError(
             f"read_table needs the name of a column for {' and for '.join(missing)}",
-            hint=f'such as pt.read_table("{several[0]}", input="u", output="y")',
+            hint=f'such as pt.read_table("{files[0]}", input="u", output="y")',
         )
     parts = [
         run_from_table(
@@ -258,7 +260,7 @@ def read_table(
             no_time=no_time,
             skip_bad_rows=skip_bad_rows,
         ).run
-        for path in several
+        for path in files
     ]
     return import_parts(parts, resample=resample).run
 

@@ -102,7 +102,7 @@ def _versions() -> Iterator[Finding]:
     own = f"pulsetrainer {__version__}, Python {platform.python_version()}"
     names, old = [], []
     for requirement in importlib.metadata.requires("pulsetrainer") or []:
-        match = re.match(r"([A-Za-z0-9_.-]+)\s*>=\s*([0-9.]+)", requirement)
+        match = re.match(r"([A-Za-z0-9_.-]+).*?>=\s*([0-9.]+)", requirement)  # typer<0.29,>=0.19 as well
         if match is None or "extra ==" in requirement:
             continue
         name, least = match.groups()

@@ -14,6 +14,7 @@ from pulsetrainer.errors import ArgumentError, UsageError
 
 EXCITATIONS = ("identification", "diagnostic")
 _NUMBERS = {"int", "float", "int | None", "float | None"}
+_WHOLE = ("int", "int | None")
 MOST_FITTED = 500  # levels: 400 take three minutes and 1.4 GB
 
 
@@ -85,6 +86,10 @@ def _check_plain(name: str, annotation: str, one: object) -> None:
         raise ArgumentError(
             f"`{name}` must be a number, got {one!r}", hint="write it without quotes and without a unit"
         )
+    if annotation in _WHOLE and isinstance(one, float) and not one.is_integer():
+        raise ArgumentError(f"`{name}` must be a whole number, got {one:g}", hint="write it without decimals")
+    if name == "rate_Hz" and isinstance(one, int | float) and not one > 0:
+        raise ArgumentError(f"`rate_Hz` must be more than 0, got {one:g}", hint="give samples a second")
     if name == "seed" and isinstance(one, int | float) and one < 0:
         raise ArgumentError(f"`seed` must be a whole number, 0 or more, got {one}", hint="0 is the usual one")
     if annotation == "Device" and not hasattr(one, "info"):

@@ -20,7 +20,7 @@ from pulsetrainer.core.identification import Method, Smoothing
 from pulsetrainer.core.initial_state import counts_from, first_stroke_words
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps import fit_notes
 from pulsetrainer.steps.arguments import EXCITATIONS, check_levels, named, several
 from pulsetrainer.steps.one_thread import one_thread
@@ -103,6 +103,10 @@ def identify(
     100.0
     """
     check_levels(levels)
+    if bootstrap < 0 or bootstrap == 1:
+        raise ArgumentError(
+            f"`bootstrap` must be 0, or 2 draws or more, got {bootstrap}", hint="200 is usual"
+        )
     whole = several(runs)
     titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)

@@ -18,7 +18,7 @@ from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _JUMP, _FEW_JUMPS = 0.5, 3  # share of the range, and how many of them: more are how it was driven
@@ -67,9 +67,11 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
 
     It is a rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
 
-    UsageError where the run has no time to resample, or the rate would make too many samples; DataError where
-    the parts differ in units, or only some have a time or a reference.
+    ArgumentError for another word; UsageError where the run has no time to resample, or the rate would make
+    too many samples; DataError where the parts differ in units, or only some have a time or a reference.
     """
+    if isinstance(resample, str) and resample != "even":
+        raise ArgumentError(f"`resample` must be a rate in Hz or 'even', got {resample!r}", hint="try 'even'")
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
     notes = (*notes, *_jumps(run))

@@ -10,6 +10,7 @@ import sys
 import traceback
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -168,6 +169,17 @@ def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
             "whole number from 2 to 500",
         ),
         (lambda *_: pt.read_table("x.csv"), "name of a column for input and for output"),
+        (lambda *_: pt.read_table([], input="u", output="y"), "read_table needs a file, got none"),
+        (
+            lambda *_: pt.read_table("tests/data/pneu_oring_3bar.csv", input="u", output="y", resample="odd"),
+            "`resample` must be a rate in Hz or 'even', got 'odd'",
+        ),
+        (lambda _, model: pt.invert("normal", model, rate_Hz=-5), "`rate_Hz` must be more than 0, got -5"),
+        (
+            lambda *_: pt.play(pt.load(KEPT / "drive.h5"), SimpleNamespace(info=0), repeats=1.5),
+            "`repeats` must be a whole number",
+        ),
+        (lambda *_: pt.identify(pt.load(KEPT / "run.h5"), bootstrap=-1), "`bootstrap` must be 0, or 2 draws"),
         (lambda _, model: pt.invert("normal", model, force_max="20 N"), "`force_max` must be a number"),
         (lambda _, model: pt.identify(None), "expected a Run, got None"),
         (lambda diagnosis, _: pt.load(diagnosis), "`path` must name a file, got a Diagnosis"),
