@@ -121,8 +121,9 @@ other model, both: A Preisach model does not suit this device: use a model of a 
 strokes: Record again in the same condition, at least three times between {low} and {high}, then with smaller
     loops that turn at {turns}, and diagnose that.
 keep steady: Something that is not in these recordings changes the device or the measurement slowly. Let
-    device and sensor warm up, keep room and supply as they are, look for draughts and loose plugs, and record
-    the same again. Diagnose both together: if they differ, it was not the device.
+    device and sensor warm up, cycle the device some twenty times through its range (it may be running in),
+    keep room and supply as they are, look for draughts and loose plugs, and record the same again. Diagnose
+    both together: if they differ, it was not the device.
 identify anew: Identify the model again in this condition, from loops of many sizes: a new run, or these
     recordings if they hold such loops. If nothing was changed since, take them together with those that the
     model was identified from. Then diagnose with the new model.

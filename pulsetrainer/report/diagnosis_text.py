@@ -171,13 +171,15 @@ def _said(one: Cause) -> dict[str, str]:
 def explains(one: Cause, found: Diagnosis) -> float:
     """Return the share of the error that a cause explains.
 
-    NaN where none is beyond noise, of a cause that could be instead of another, since beside that one it
-    explains nothing, and of one that was read off the raw data, whose samples are left out.
+    NaN where none is beyond noise, of a cause that explains no more than noise would, of one that could be
+    instead of another, since beside that one it explains nothing, and of one that was read off the raw data,
+    whose samples are left out.
     """
     beyond = not found.static_percent <= found.floor_percent
     untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
     instead = not one.found and any(one.cause in other.confounded_with for other in found.found)
-    unknown = instead or (untested and one.explains_percent == 0.0)
+    by_noise = not one.found and one.p_value is not None and one.p_value > LIMITS.p_max
+    unknown = instead or by_noise or (untested and one.explains_percent == 0.0)
     return one.explains_percent if (beyond or untested) and not unknown else math.nan
 
 

@@ -1448,6 +1448,17 @@ def test_that_a_large_effect_would_have_shown_is_no_news(monkeypatch):
     assert [one.figures for one in told if one.kind == "would have shown"] == [{"creep": pytest.approx(9.9)}]
 
 
+def test_that_the_rest_is_largest_at_rest_is_said_once(monkeypatch):
+    """It was said of the rate and, in the same words, of the direction."""
+    at = np.asarray([0.0, 1.0])
+    groups = [residual.Group(name, "1", at, np.arange(2)) for name in ("rate", "level", "direction")]
+    monkeypatch.setattr(residual, "groups", lambda problem: groups)
+    monkeypatch.setattr(residual, "rms_by", lambda group, left: np.asarray([3.0, 1.0]))
+    scale = SimpleNamespace(places=lambda at, unit: at, reach=1.0)
+    state = SimpleNamespace(problem=None, current=SimpleNamespace(residual=None), scale=scale)
+    assert [one.names for one in account._largest(state)] == [("rest",), ("level",)]
+
+
 @pytest.mark.parametrize(
     ("left", "relevant", "said"),
     [((2.0, 3.02), 4.01, True), ((2.0, 3.0), 4.01, False), ((2.0, 3.02), 3.99, False)],

@@ -167,10 +167,11 @@ def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
 def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
     """A share of an error that is no larger than noise would say that a cause was there."""
     found = store_examples.diagnosis()
-    one = replace(_cause(0.5), explains_percent=100.0)
+    one = replace(_cause(0.1 * LIMITS.p_max), explains_percent=100.0)
     for left, known in ((0.9, False), (1.0, False), (1.1, True)):
         share = explains(one, replace(found, static_percent=left, floor_percent=1.0))
         assert (share == 100.0) is known
+    assert math.isnan(explains(replace(one, p_value=0.5), found))  # noise does as much
     small = replace(found, static_percent=0.9, floor_percent=1.0)
     assert math.isnan(explains(replace(one, found=True), small))
     assert explains(replace(one, found=True, p_value=None), small) == 100.0  # a change of condition
@@ -195,7 +196,7 @@ def test_the_chart_shows_what_explains_something():
     """Causes that were found, and those that look like some of it: not the many that explain 0.0 %."""
     found = store_examples.diagnosis()
     strong, weak, none = (
-        replace(_cause(0.5), cause=name, explains_percent=share)
+        replace(_cause(0.1 * LIMITS.p_max), cause=name, explains_percent=share)
         for name, share in (("delay", 30.0), ("viscous", 0.2), ("step", 0.04))
     )
     axes = ranking(replace(found, causes=(strong, weak, none))).axes[0]

@@ -91,7 +91,8 @@ def _not_accepted(state: State) -> Iterator[Evidence]:
 
 
 def _largest(state: State) -> Iterator[Evidence]:
-    """Where the remaining residual is largest."""
+    """Where the remaining residual is largest; while the input rests is said once."""
+    at_rest = False
     for group in residual.groups(state.problem):
         rms = residual.rms_by(group, state.current.residual)
         most, least = float(np.nanmax(rms)), float(np.nanmin(rms))
@@ -100,6 +101,9 @@ def _largest(state: State) -> Iterator[Evidence]:
             at, name = float(state.scale.places(group.at, group.unit)[k]), group.name
             if name == "rate":
                 at, name = at * state.scale.reach, "rest" if k == 0 else name
+            if name == "direction" and at == 0.0 and at_rest:
+                continue
+            at_rest = at_rest or name == "rest"
             yield Evidence(
                 "largest", figures={"at": at, "times": min(most / least, LIMITS.largest_told)}, names=(name,)
             )
