@@ -95,6 +95,7 @@ def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     added = {one.cause: {p.name: p.value for p in one.parameters} for one in model.extensions}
     rows = {
         f"left out {one.cause}": "comes from the measurement: pulsetrainer correct"
+        + "; the model is of the time before it" * library()[one.cause].sudden
         if one.cause in found.correctable
         else "; ".join(one.doubts) or "does not last"
         for one in found.found

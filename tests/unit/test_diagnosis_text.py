@@ -10,7 +10,7 @@ import store_examples
 
 from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
-from pulsetrainer.report import tables
+from pulsetrainer.report import diagnosis_results, tables
 from pulsetrainer.report.diagnosis_figures import course, ranked, ranking
 from pulsetrainer.report.diagnosis_html import headline
 from pulsetrainer.report.diagnosis_text import (
@@ -248,3 +248,13 @@ def test_evidence_that_stands_with_a_cause_is_not_repeated():
     found = replace(store_examples.diagnosis(), causes=(one,), evidence=said)
     assert evidence(found) == ["outliers: all in one minute."]
     assert evidence(replace(found, causes=())) == list(said)
+
+
+@pytest.mark.parametrize(("name", "before"), [("step", True), ("offset-drift", False)])
+def test_an_extended_model_is_of_the_time_before_a_step(name, before):
+    """If the device itself changed then, it is no model of what the device is now."""
+    found = store_examples.diagnosis()
+    told = replace(_cause(0.001, found=True), cause=name)
+    told = replace(found, causes=(told,), correctable=(name,))
+    row = diagnosis_results._apart(told, store_examples.model(6))[f"left out {name}"]
+    assert ("of the time before it" in row) is before
