@@ -55,6 +55,9 @@ def inline_svg(figure: Figure, *, identifier: str, title: str, description: str)
         root.attrib.pop(name, None)
     root.set("role", "img")
     root.set("class", "plot")
+    root.set(
+        "preserveAspectRatio", "xMinYMin meet"
+    )  # lowered to fit a page, it begins where its caption does
     wide, tall = figure.get_size_inches()
     # inches: at this size its letters are as in SETTINGS
     root.set("style", f"--wide:{wide:g};--tall:{tall:g}")
