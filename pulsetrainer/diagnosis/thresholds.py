@@ -141,6 +141,7 @@ class Thresholds:
     repeated: float = 0.5  # of the gain of the fit: a smaller gain on the pieces may be chance
     mends: float = 0.1  # of what can be explained: with less, a cause that may be nothing is not found
     held_by_the_rest: float = 0.035  # of a fault's squares: other kinds leave up to 0.035, true faults 0.039
+    two_sizes: float = 2.0  # ratio: told so differently by two fits, a fault has another course (2.5 to 3.1)
     even_drift: float = 4.0  # mean square of a drift that goes on evenly from zero, over its variance
     predicts_though_held: float = 0.8  # of the reducible held-out error: true drifts, though absorbed, 0.85
     told_though_held: float = 0.001  # of the span, rms: an absorbed fault that explains more is reported

@@ -125,6 +125,8 @@ predicts little: on parts of the recordings that were left out it explains less 
     explained, as any cause may if the model cannot follow a device of this kind
 imitates: on parts of the recordings that were left out it predicts less than three quarters of what the model
     leaves without it: something else that the device does as it moves may look like it
+two sizes: how large it is these recordings do not tell, since it has another course than its formula: it is
+    neither added nor taken out
 spans zero: its strength may be zero: the interval includes zero
 no equal loops: only a minor loop traced three times in equal time would show it; there is none
 at bound: a parameter, or the interval of one, is at the end of the range that was searched

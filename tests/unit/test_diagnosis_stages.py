@@ -1898,6 +1898,26 @@ def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
     assert begin._told_by_both(told, second) == told  # it is said once
 
 
+@pytest.mark.parametrize(
+    ("name", "times", "doubted"),
+    [("offset-drift", 2.1, True), ("offset-drift", 1.9, False), ("creep", 9.0, False)],
+)
+def test_a_slow_fault_that_two_fits_tell_differently_is_in_doubt(monkeypatch, name, times, doubted):
+    """A zero that wanders as a sine was a drift three times as large, and taken out: 981 % worse."""
+    free, rest = _fit(1.0, name), _fit(2.0, name)
+    sizes = {id(free): times**2, id(rest): 1.0}
+    monkeypatch.setattr(begin, "squares_moved", lambda state, term: sizes[id(state.current)])
+    one, two = (Estimate("rate", value, "1", value - 0.1, value + 0.1) for value in (times, 1.0))
+    found = begin._told_by_both(Finding(CAUSE[name], found=True, parameters=(one,)), (two,))
+    found = begin._sized(_state(free), rest, found)
+    assert (begin.TWO_SIZES in found.doubts) is doubted
+    told = 1.0 if name == "offset-drift" else times  # a slow fault is told from rest
+    assert found.parameters[0].value == told
+    assert (found.parameters[0].lower, found.parameters[0].upper) == (0.9, times + 0.1)
+    advised = advice.stage(_state(_fit(1.0), findings=(found,), verdict="unknown")).advice.kind
+    assert (advised == "keep steady") is doubted
+
+
 @pytest.mark.parametrize("averaged", [1, 3])
 def test_within_averages_is_all_that_single_samples_have_beyond_them(averaged):
     """Also where what is fitted holds averages of the samples as measured: nothing else was counted once."""

@@ -6,7 +6,8 @@ The first of these that applies is the advice:
 - If the model as given is of the wrong kind, or of another condition, another model is needed.
 - If the device was still settling when the records began, it must rest first.
 - If no verdict is reached and what is left is the same in two records of one input, another kind of model is
-  needed. If it differs between them, or follows time alone, device and sensor must be kept steady. If the
+  needed. If it differs between them, or follows time alone (also as a drift of another course), device and
+  sensor must be kept steady. If the
   weights may hide a fault of the measurement, a record without it is needed.
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
@@ -34,6 +35,7 @@ from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.residual import LENGTH, RATES
+from pulsetrainer.diagnosis.stages.begin import TWO_SIZES
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -86,6 +88,8 @@ def _of_the_conditions(state: State) -> Evidence | None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
     seen = [one.kind for one in state.evidence] if state.verdict == "unknown" else []
     told = [_OF_WHAT_IS_LEFT[kind] for kind in _OF_WHAT_IS_LEFT if kind in seen]
+    if state.verdict == "unknown" and any(TWO_SIZES in one.doubts for one in state.findings):
+        told.append("keep steady")
     return Evidence(told[0]) if told else None
 
 

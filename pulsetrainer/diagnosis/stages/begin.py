@@ -8,7 +8,8 @@ predicts what comes after the first fifth of each record better than the first f
 something was going on before the records, and the beginning stays free.
 
 Both fits are of the same records, so the interval of a parameter covers the results of both. If that interval
-then spans zero for all strengths of a cause, the cause is in doubt.
+then spans zero for all strengths of a cause, the cause is in doubt. So is a slow fault of the measurement
+whose size differs by more than a factor of two: it has another course than its formula.
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.stages.parameters import estimates_of
-from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, squares_moved
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
+
+TWO_SIZES = "two sizes"
 
 
 def stage(state: State) -> State:
@@ -37,7 +40,9 @@ def stage(state: State) -> State:
     if kept is state.current:
         return replace(state, repeated_estimates=state.estimates)
     told = state.in_its_units(estimates_of(kept, state.scores, state.held_out, state.floor))
-    findings = tuple(_told_by_both(one, told.get(one.cause.id, ())) for one in state.findings)
+    findings = tuple(
+        _sized(state, kept, _told_by_both(one, told.get(one.cause.id, ()))) for one in state.findings
+    )
     told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
     return replace(state, repeated=kept, repeated_estimates=told, findings=findings)
 
@@ -48,12 +53,37 @@ def begins_at_rest(problem: Problem) -> Problem:
 
 
 def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
-    """Return a finding with the intervals of both fits, in doubt if its strength may then be zero."""
-    both = replace(found, parameters=_hull(found.parameters, others))
+    """Return a finding with the intervals of both fits, in doubt if its strength may then be zero.
+
+    A slow fault is told by the fit from rest: a free beginning and a large drift may imitate another course.
+    """
+    rows, same = found.parameters, [one.name for one in found.parameters] == [one.name for one in others]
+    both = replace(
+        found, parameters=_hull(others, rows) if _is_slow_fault(found) and same else _hull(rows, others)
+    )
     strengths = both.cause.strengths_of(both.parameters) if found.found else ()
     if not may_be_nothing(strengths) or MAY_BE_NOTHING in found.doubts:
         return both
     return replace(both, doubts=(*both.doubts, MAY_BE_NOTHING))
+
+
+def _is_slow_fault(one: Finding) -> bool:
+    return one.found and one.cause.drifts and not one.cause.lasting
+
+
+def _sized(state: State, kept: Fitted, found: Finding) -> Finding:
+    """Return a finding in doubt if it is a slow fault of which both fits tell another size.
+
+    What wanders in another way than the formula says is imitated by a free beginning and a large drift.
+    """
+    terms = [
+        [one for one in fitted.terms if one.cause.id == found.cause.id] for fitted in (state.current, kept)
+    ]
+    if not _is_slow_fault(found) or not all(terms):
+        return found
+    fits = zip((state.current, kept), terms, strict=True)
+    low, high = sorted(squares_moved(replace(state, current=fitted), term) for fitted, (term,) in fits)
+    return replace(found, doubts=(*found.doubts, TWO_SIZES)) if high > LIMITS.two_sizes**2 * low else found
 
 
 def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
