@@ -27,9 +27,13 @@ AGAIN, DIFFERS = "comes again", "differs"
 
 
 def told(state: State) -> list[Evidence]:
-    """Return what the two records whose inputs are most alike say of what is left, or nothing."""
-    if len(state.problem.records) == 1 or state.question.quick or not state.unexplained:
+    """Return what the two records whose inputs are most alike say of what is left, or nothing.
+
+    What is in doubt is left, too.
+    """
+    if len(state.problem.records) == 1 or state.question.quick or not state.believed.unexplained:
         return []
+    state = state.believed
     same = [pair for pair in _pairs(state) if pair[0] <= LIMITS.same_input]
     if not same:
         return []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -71,3 +73,19 @@ def test_a_device_that_does_the_same_again_is_told_from_one_on_which_something_a
     assert said in told[0].split("what is left ")[1]
     alone = pt.diagnose(runs[0], pt.identify(runs[0]))
     assert not any("In two of these recordings" in one for one in alone.evidence)
+
+
+@pytest.mark.slow
+def test_what_a_doubtful_cause_would_explain_is_left_too():
+    """A zero that wanders was a step in doubt, and the advice was to record the same again, for ever."""
+    u = excitations.diagnostic(0.0, 1.0, rate_Hz=RATE_HZ).value[:6000]
+    span = np.ptp(_plays(u))
+    runs = []
+    for k, phase in enumerate((1.3, 4.1)):
+        run = _recorded(u, k)
+        wander = 0.02 * span * np.sin(2 * np.pi * np.arange(u.size) / (0.6 * u.size) + phase)
+        runs.append(replace(run, output=run.output + wander))
+    found = pt.diagnose(runs, pt.identify(runs[0]))
+    assert found.verdict == "unknown"
+    assert any("In two of these recordings" in one for one in found.evidence)
+    assert "Record the same again" not in found.next_experiment
