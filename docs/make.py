@@ -18,7 +18,7 @@ from verdict import verdict_page
 
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.options import takers
+from pulsetrainer.cli.settings import takers
 from pulsetrainer.files.schema import FieldPlan, plan_of
 from pulsetrainer.files.settings import SETTINGS, VARIABLE
 from pulsetrainer.version import __version__

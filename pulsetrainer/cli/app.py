@@ -10,10 +10,10 @@ from typing import Annotated, Any
 import typer
 from typer import Option
 
-from pulsetrainer.cli import guard, options
+from pulsetrainer.cli import guard, settings
 from pulsetrainer.cli.help_text import Program
 from pulsetrainer.cli.naming import Command
-from pulsetrainer.files import settings
+from pulsetrainer.files import settings as setting_files
 from pulsetrainer.version import __version__
 
 # Plain help: drawing it with rich would cost a third of the time until it shows.
@@ -61,11 +61,11 @@ def root(
     """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
     if context.resilient_parsing or {"-h", "--help"} & set(sys.argv):
         return  # help and completion need no settings, and a bad file must not hide them
-    file = settings.find(settings_file, os.environ)
+    file = setting_files.find(settings_file, os.environ)
     context.obj = file
     if file is not None:
         program: Any = context.command
-        context.default_map = options.defaults(settings.read(file), program.commands)
+        context.default_map = settings.defaults(setting_files.read(file), program.commands)
 
 
 def main() -> None:

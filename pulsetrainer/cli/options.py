@@ -1,15 +1,14 @@
-"""Options that several commands share, each with its help; which of them the file of settings sets."""
+"""Options that several commands share, each with its help."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from typer import BadParameter, CallbackParam, Option
 
-from pulsetrainer.files.settings import SETTINGS, Setting, variable
+from pulsetrainer.files.settings import SETTINGS, variable
 
 
 def positive(value: float | None, param: CallbackParam) -> float | None:
@@ -92,26 +91,3 @@ LimitForce = Annotated[
         "Force above which the device switches off, N; it can only lower the device's own limit.",
     ),
 ]
-
-
-def takers(setting: Setting, commands: Mapping[str, Any]) -> dict[str, str]:
-    """Return which of the program's commands take a setting, each with the parameter of its function.
-
-    They are those with an option of the setting's environment variable.
-    """
-    return {
-        name: parameter.name
-        for name, command in commands.items()
-        for parameter in command.params
-        if parameter.envvar == setting.variable
-    }
-
-
-def defaults(values: Mapping[str, Any], commands: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return settings as the parser takes them: by command and by parameter of its function."""
-    found: dict[str, dict[str, Any]] = {}
-    for setting in SETTINGS:
-        if setting.key in values:
-            for command, parameter in takers(setting, commands).items():
-                found.setdefault(command, {})[parameter] = values[setting.key]
-    return found

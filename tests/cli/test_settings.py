@@ -10,7 +10,7 @@ import pytest
 import typer
 
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.options import defaults, takers
+from pulsetrainer.cli.settings import defaults, takers
 from pulsetrainer.files.settings import SETTINGS
 from wording import refusal
 
