@@ -17,6 +17,7 @@ import report_examples
 import store_examples
 
 from pulsetrainer.artefacts import Evaluation, Quiz
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report.html import render_evaluation
 from pulsetrainer.report.score_sheet import render_session
 from pulsetrainer.steps.quiz import score
@@ -142,12 +143,14 @@ def _diagnosis(file):
     listed = [cause.attrs for cause in file["causes"].values()]
     chosen = [one for one in listed if one["found"]]
     chosen += [one for one in listed if not one["found"] and one["explains_percent"] > 0]
-    # beside a cause that was found, one that could be instead has no share of its own
+    # beside a cause that was found, one that could be instead has no share of its own; nor has what noise
+    # explains as well
     instead = {name for one in chosen if one["found"] for name in one["confounded_with"]}
     for one in chosen[:12]:
         for name in ("explains_percent", "held_out_gain_percent"):
             value = float(one[name])
-            if name == "explains_percent" and not one["found"] and one["cause"] in instead:
+            by_noise = one["p_value"] > LIMITS.p_max
+            if name == "explains_percent" and not one["found"] and (by_noise or one["cause"] in instead):
                 continue
             if name != "held_out_gain_percent" or (one["found"] and math.isfinite(value)):
                 found[f"{one['cause']}.{name}"] = value
