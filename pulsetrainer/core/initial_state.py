@@ -88,10 +88,7 @@ def left_out_words(samples: int) -> str:
 
 def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> int:
     """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart."""
-    reach = high - low
-    away, back = inputs - low, high - inputs
-    if away[0] > NEAR * reach:
-        away, back = back, away
+    away, back, reach = _from_its_end(inputs, low, high)
     all_strokes = _strokes(away, outputs, reach)
     first, later = all_strokes[:1], [one for one in all_strokes[1:] if _told(one, reach)]
     others = [one for one in _strokes(back, outputs, reach) if _told(one, reach)]
@@ -129,23 +126,21 @@ def _is_apart(
 
 def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
     """First sample (n,) at an end of [low, high] again, of a record that begins at one; 0 for none."""
-    low, high = _reached(inputs, low, high)
-    away, back, reach = inputs - low, high - inputs, high - low
-    if min(away[0], back[0]) > NEAR * reach:
-        return 0
-    return _second_stroke(away, back, reach) if away[0] < back[0] else _second_stroke(back, away, reach)
+    away, back, reach = _from_its_end(inputs, *_reached(inputs, low, high))
+    return 0 if away[0] > NEAR * reach else _second_stroke(away, back, reach)
 
 
 def only_stroke(inputs: FloatArray, low: float, high: float) -> int:
     """Where the first stroke of a record is over that begins at an end; 0 where a later one begins there."""
-    second = second_stroke(inputs, low, high)
-    if not second:
-        return 0
-    low, high = _reached(inputs, low, high)
-    reach = high - low
-    away = inputs - low if inputs[0] - low < high - inputs[0] else high - inputs
+    away, _, reach = _from_its_end(inputs, *_reached(inputs, low, high))
     later = _strokes(away, inputs, reach)[1:]
-    return 0 if any(_told(one, reach) for one in later) else second
+    return 0 if any(_told(one, reach) for one in later) else second_stroke(inputs, low, high)
+
+
+def _from_its_end(inputs: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray, float]:
+    """How far an input (n,) is from the end that it begins at, and from the other; how far they are apart."""
+    away, back = inputs - low, high - inputs
+    return (away, back, high - low) if away[0] <= back[0] else (back, away, high - low)
 
 
 def _second_stroke(away: FloatArray, back: FloatArray, reach: float) -> int:

@@ -20,7 +20,7 @@ from pulsetrainer.artefacts import (
     Session,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import same_units, units_of
+from pulsetrainer.artefacts.units import counted, same_units, units_of
 from pulsetrainer.core import metrics, wild
 from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, only_stroke
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -163,10 +163,10 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 f"{title} was identified in {units_of(model)}, but {name} is in {units_of(run)}",
                 hint="use a model of the same device; in other units, convert the columns and import again",
             )
-    counted, first_strokes = _counted(name, run, models)
+    parts, first_strokes = _parts(name, run, models)
     notes += first_strokes
     for title, model in zip(model_names, models, strict=True):
-        one = _of_model(title, model, run, counted, found[0].rms if found else None)
+        one = _of_model(title, model, run, parts, found[0].rms if found else None)
         if model.fit and model.fit.warning:
             warnings.append(f"{title}: {model.fit.warning}")
         if _is_fitted_to(model, run):
@@ -195,7 +195,7 @@ def _wild_words(name: str, run: Run) -> list[str]:
     for part, tamed in zip(parts, wild.tame([(one.input, one.output) for one in parts]), strict=True):
         found = (tamed.wild_input | tamed.wild_output) & part.counts
         count += int(np.count_nonzero(wild.by_chance(found, part.input, reach)))
-    looks = "1 sample looks" if count == 1 else f"{count} samples look"
+    looks = counted(count, "sample", "looks", "look")
     return [f"{looks} wild in {name}, and count in its errors"] if count else []
 
 
@@ -208,19 +208,19 @@ def _is_fitted_to(model: Model, run: Run) -> bool:
     return np.array_equal(run.time_s[at], fit.time_s) and np.array_equal(run.output[at], fit.output)
 
 
-def _counted(name: str, run: Run, models: Sequence[Model]) -> tuple[list[tuple[Run, BoolArray]], list[str]]:
+def _parts(name: str, run: Run, models: Sequence[Model]) -> tuple[list[tuple[Run, BoolArray]], list[str]]:
     """Return the parts of a run with the samples (n,) of each that count, and notes about first strokes.
 
     All models are compared on the same samples: those at which the memory of each of them is known.
     """
-    counted, notes = [], []
+    parts, notes = [], []
     for part in to_their_tips(list(run.parts(SHORTEST_PART))):
         begin, why = _begin(part, run.dt_s, models)
         notes += [f"{name}: {why}"] if why else []
         kept = part.counts
         kept[:begin] = False
-        counted.append((part, kept))
-    return counted, notes
+        parts.append((part, kept))
+    return parts, notes
 
 
 def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int, str]:
@@ -260,20 +260,18 @@ def _misses(part: Run, first: int, dt_s: float | None, model: Model) -> bool:
 
 
 def _of_model(
-    name: str, model: Model, run: Run, counted: Sequence[tuple[Run, BoolArray]], first_rms: float | None
+    name: str, model: Model, run: Run, parts: Sequence[tuple[Run, BoolArray]], first_rms: float | None
 ) -> ModelEvaluation:
-    """Return the prediction error of one model on what is ``counted``; its gain is over ``first_rms``."""
+    """Return the error of one model on what counts of ``parts``; its gain is over ``first_rms``."""
     operator = operator_of(model)
     low, high = input_range(model)
-    records = [Record(part.input, part.output, known.astype(np.float64)) for part, known in counted]
-    start, state = estimated_start(operator, records, range_of(model, [part for part, _ in counted]))
+    records = [Record(part.input, part.output, known.astype(np.float64)) for part, known in parts]
+    start, state = estimated_start(operator, records, range_of(model, [part for part, _ in parts]))
     if model.extensions and start is not None:  # these are predicted from rest
         state = "negative saturation, as for every extended model"
-    predicted = np.concatenate(
-        [predict(model, part.input, run.dt_s, start)[known] for part, known in counted]
-    )
-    measured = np.concatenate([part.output[known] for part, known in counted])
-    times = [part.time_s[known] for part, known in counted if part.time_s is not None]
+    predicted = np.concatenate([predict(model, part.input, run.dt_s, start)[known] for part, known in parts])
+    measured = np.concatenate([part.output[known] for part, known in parts])
+    times = [part.time_s[known] for part, known in parts if part.time_s is not None]
     errors = metrics.prediction(measured, predicted)
     offset = float(np.mean(measured - predicted))
     outside = (run.input < low - BEYOND * (high - low)) | (run.input > high + BEYOND * (high - low))

@@ -57,10 +57,10 @@ def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
 
     A slow fault is told by the fit from rest: a free beginning and a large drift may imitate another course.
     """
-    rows, same = found.parameters, [one.name for one in found.parameters] == [one.name for one in others]
-    both = replace(
-        found, parameters=_hull(others, rows) if _is_slow_fault(found) and same else _hull(rows, others)
-    )
+    first, second = found.parameters, others
+    if others and _is_slow_fault(found):
+        first, second = second, first
+    both = replace(found, parameters=_hull(first, second))
     strengths = both.cause.strengths_of(both.parameters) if found.found else ()
     if not may_be_nothing(strengths) or MAY_BE_NOTHING in found.doubts:
         return both
