@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
+from pulsetrainer.artefacts.time_steps import steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_dialect import cell_at, column_words
@@ -74,7 +75,7 @@ def time_of(
         table = replace(table, columns={**table.columns, heading: stamps})
         notes = (*notes, f"the time of {table.path} {again}")
     time_s = seconds(table, time, of_record=True)
-    step = float(np.median(np.diff(time_s)))
+    step = steps_of(time_s).median if time_s.size > 1 else np.nan
     if not unit and step >= _SLOW_S and time_s.size >= _MANY:
         said = f"the samples of {table.path} are {step:g} s apart if its time is in seconds, as assumed"
         notes = (*notes, f"{said} (if it is in ms, write the heading as '{heading} [ms]')")
@@ -112,8 +113,7 @@ def _begun_again(stamps: FloatArray, unit: str) -> tuple[FloatArray, str]:
 
     A step back is midnight where with a day more it is a usual step of the record.
     """
-    step = np.diff(stamps)
-    back = np.flatnonzero(step < 0)
+    back = np.flatnonzero(stamps[1:] < stamps[:-1])
     whole, said = (_DAY_S, "goes past midnight: a day is added from there on")
     if unit in _COUNTERS:
         whole, said = _COUNTER, "begins again, as a counter of 32 bits does: 2^32 is added from there on"
@@ -121,6 +121,7 @@ def _begun_again(stamps: FloatArray, unit: str) -> tuple[FloatArray, str]:
         return stamps, ""
     if not back.size or stamps.min() < 0 or stamps.max() >= whole:
         return stamps, ""
+    step = np.diff(stamps)
     usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
     if np.any(np.abs(step[back] + whole - usual) > _USUAL_STEP * usual):
         return stamps, ""

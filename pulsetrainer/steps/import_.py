@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
@@ -23,6 +24,7 @@ from pulsetrainer.errors import ArgumentError, DataError, UsageError
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _JUMP, _FEW_JUMPS = 0.5, 3  # share of the range, and how many of them: more are how it was driven
 _EVEN = 0.05  # of the range: no other step is larger
+_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 _LEAST = 2  # samples between two gaps: of fewer there is no step to resample
 
 
@@ -139,10 +141,9 @@ def _jumps(run: Run) -> list[str]:
     reach = float(np.ptp(run.input))
     found: list[int] = []
     for part in run.slices:
-        step = np.abs(np.diff(run.input[part]))
-        at = np.flatnonzero(step > _JUMP * reach)
+        at, other = _far_steps(run.input[part], _JUMP * reach)
         lonely = at.size <= _FEW_JUMPS and np.all(np.diff(at) > 1)  # else a staircase, or a wild sample
-        if not lonely or np.delete(step, at).max(initial=0.0) > _EVEN * reach:
+        if not lonely or other > _EVEN * reach:
             return []
         found += [(part.start or 0) + int(k) + 1 for k in at]
     if not found:
@@ -155,6 +156,17 @@ def _jumps(run: Run) -> list[str]:
     share = 100.0 * abs(float(run.input[found[0]] - run.input[found[0] - 1])) / reach
     said = f"the input of {run.signal} jumps by {share:.0f} % of its range from one sample to the next, "
     return [f"{said}{where}: if the device was not driven so, a piece of the record is missing"]
+
+
+def _far_steps(inputs: FloatArray, far: float) -> tuple[NDArray[np.int64], float]:
+    """Return the steps (k,) of an input (n,) that are larger than ``far``, and the largest of the others."""
+    found, other = [np.empty(0, np.int64)], 0.0
+    for k in range(0, inputs.size - 1, _BLOCK):
+        step = np.abs(np.diff(inputs[k : k + _BLOCK + 1]))
+        large = step > far
+        found.append(k + np.flatnonzero(large))
+        other = max(other, float(step[~large].max(initial=0.0)))
+    return np.concatenate(found), other
 
 
 def _notes_on_time(name: str, report: Report) -> list[str]:
