@@ -181,7 +181,7 @@ def judged(kind: str, seed: int, percent: float) -> str:
 
 
 def played(device: Device, strength: float, model: pt.Model) -> float:
-    """Rms error of the normal pulse, of the device's span in per cent, when a model's inverse is played on it."""
+    """Rms error of the normal pulse, per cent of the span, when a model's inverse is played on the device."""
     drive = pt.invert("normal", model, periods=8, rate_Hz=RATE_HZ)
     error = (device(drive.compensated, strength) - drive.target)[drive.scored]
     return 100.0 * float(np.sqrt(np.mean(error**2))) / device.span
