@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
+from pulsetrainer.artefacts import LARGEST, FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.units import counted, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
@@ -114,7 +114,11 @@ class Table:
                 hint=f"remove those rows, or {_AGAIN if self.mostly(bad) else remedy}",
             )
         if said := beyond_all_quantities(values):
-            raise DataError(f"{self.path}, {column_words(name)}, {said}", hint="correct or remove those rows")
+            first = self.place(int(np.argmax(np.abs(values) > LARGEST)))
+            raise DataError(
+                f"{self.path}, {column_words(name)}, {said}: the first is in {first}",
+                hint="correct or remove those rows",
+            )
         return values
 
     def _cell(self, name: str, row: int) -> str:

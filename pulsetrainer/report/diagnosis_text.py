@@ -9,12 +9,13 @@ from itertools import chain, count, pairwise
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import with_seconds, with_unit
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
 _NOTHING = 1e-3  # of an interval: a value of less is rounding
+_LONG_TIMES = (" min", " h", " d")  # in seconds a reader would have to divide
 _CURVE = re.compile(r"[fg]\d+")  # the values of a learned curve, of a gain: one by one they say nothing
 _OF_A_CURVE = ("state", "low", "high")
 DRAWN = "the report (--html) draws it"
@@ -157,7 +158,10 @@ def parameter(one: Parameter) -> str:
     between = f"{low} to {high}" if low != high else f"± {half:.1g}"  # "7 to 7" would tell nothing
     interval = f" (95 %: {between})" if known else ""
     value = one.value if not known or abs(one.value) > _NOTHING * (one.upper - one.lower) else 0.0
-    return with_unit(f"{value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
+    said = with_unit(f"{value:.4g}", one.unit)
+    if one.unit == "s" and (easy := with_seconds(value)).endswith(_LONG_TIMES):
+        said += f" = {easy}"
+    return said + interval + (f": {one.meaning}" if one.meaning else "")
 
 
 def _said(one: Cause) -> dict[str, str]:

@@ -119,6 +119,8 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     assert (
         parameters([Parameter("tau", 1.5, "s", NAN, NAN)])["tau"] == "1.5 s"
     )  # a file of 0.1, a quick screen
+    long = parameters([Parameter("tau", 8640.0, "s", 7200.0, 9000.0)])
+    assert long["tau"] == "8640 s = 2.4 h (95 %: 7.2e+03 to 9e+03)"
     narrow = parameters([Parameter("f", 7.0, "Hz", 6.9999, 7.0003)])
     assert narrow["f"] == "7 Hz (95 %: ± 0.0003)"  # "7 to 7" told nothing
     none = parameters([Parameter("filter", 6.6e-15, "s", 0.0, 0.0033)])

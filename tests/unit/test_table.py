@@ -556,7 +556,7 @@ def test_a_time_behind_a_date_is_found(table):
 def test_what_no_quantity_reaches_is_refused(table, cell):
     """Its square is infinite: no figure and no fit would come of it."""
     path = table(f"when,u,y\n0,1,2\n1,{cell},3\n2,1,2\n").path
-    with raises(DataError, "out of all bounds", place="t.csv, column u"):
+    with raises(DataError, "out of all bounds", place="t.csv, column u", first="line 3"):
         read_run(path, **COLUMNS)
 
 
