@@ -83,7 +83,7 @@ MESSAGES = {
     "no numbers": Message("no numbers", "another column", "{file}", "column t_s"),
     "nearest column": Message("no column '{asked}'", "{near}", expected="{has}"),
     "two lengths": Message("one length", ""),
-    "out of all bounds": Message("goes from", "", "{place}", "the limit of 1e+100", "the first is in {first}"),
+    "out of all bounds": Message("goes from", "", "{place}", "the limit of 1e+100", "first is in {first}"),
     "column of text": Message("has text, not numbers", "", "{place}"),
     "time stands": Message("does not increase", "", "{place}", got="line {line}: {stamp}"),
     "no unit of time": Message("in {unit}", "", "{place}"),

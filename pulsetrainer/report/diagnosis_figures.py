@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import textwrap
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
@@ -41,8 +43,8 @@ def course(found: Diagnosis) -> Figure:
     """Return the measured output with the static model, and the residuals before and after extension."""
     figure = Figure(figsize=(COLUMN_IN, 4.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
-    panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
-    panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
+    _drawn(above, found, found.output, **GROUND, label="measured")
+    _drawn(above, found, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
     sure, doubted = beside(found)
     named = found.verdict in [one.cause for one in found.found]
@@ -51,16 +53,22 @@ def course(found: Diagnosis) -> Figure:
     more = f"; in doubt: {', '.join(doubted)}" if named and doubted else ""
     above.set_title(f"Verdict: {verdict}{how}{more}", wrap=True)
     panels.headroom(above)
-    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="without causes")
+    _drawn(below, found, found.output - found.before, **ERROR, label="without causes")
     if found.extended_percent < found.static_percent:
-        left = found.output - found.after
-        panels.trace(below, found.time_s, left, **MODEL, label="with them")
+        _drawn(below, found, found.output - found.after, **MODEL, label="with them")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
     name = "sample number" if _timeless(found) else label("time", "s")
     below.set_xlabel(name if len(found.records) == 1 else f"{name}, recordings one after another")
     panels.headroom(below)
     return figure
+
+
+def _drawn(axes: Axes, found: Diagnosis, values: FloatArray, **style: Any) -> None:
+    """Draw values (n,) over the time: no line goes from one recording to the next."""
+    begins = np.searchsorted(found.time_s, [one.begin_s for one in found.records[1:]])
+    times = np.insert(found.time_s, begins, found.time_s[np.minimum(begins, values.size - 1)])
+    panels.trace(axes, times, np.insert(values, begins, np.nan), **style)
 
 
 def _timeless(found: Diagnosis) -> bool:

@@ -567,6 +567,19 @@ def test_a_diagnosis_without_time_draws_none():
     assert said == ["time [s]", "sample number"]
 
 
+def test_no_line_goes_from_one_recording_to_the_next():
+    """What was recorded on another day looked like a jump of the output."""
+    found = stored.diagnosis()
+    middle = found.time_s[found.time_s.size // 2]
+    two = replace(found, records=(Recorded("a", 0.1), Recorded("b", 0.1, float(middle))))
+    for drawn, holes in ((found, 0), (two, 1)):
+        for axes in diagnosis_figures.course(drawn).axes:
+            lines = [line.get_ydata() for line in axes.lines if line.get_ydata() is not None]
+            curves = [y for y in lines if len(y) > 2]
+            assert curves
+            assert all(np.count_nonzero(np.isnan(y)) == holes for y in curves)
+
+
 def test_the_rounding_of_a_rest_is_no_speed():
     """A table of four decimals rests at 1e-15 ranges a second: fifteen labels stood on one another."""
     for slowest, scale in ((0.2, "linear"), (0.002, "symlog")):
