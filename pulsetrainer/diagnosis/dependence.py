@@ -193,6 +193,8 @@ def _fall(grams: Sequence[FloatArray], along: Sequence[FloatArray]) -> FloatArra
     """Fall (m,) for one state from its products (k, k) and those with the signals (k, m), of each piece."""
     gram, whole = np.sum(grams, axis=0), np.sum(along, axis=0)
     fall = np.zeros(whole.shape[1])
+    if not gram.any():  # a state that never changes
+        return fall
     for inner, here in zip(grams, along, strict=True):
         curve = np.linalg.solve(gram - inner + _penalty(gram), whole - here)
         fall += 2.0 * np.sum(curve * here, axis=0) - np.sum(curve * (inner @ curve), axis=0)

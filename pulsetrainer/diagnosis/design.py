@@ -140,8 +140,10 @@ class Bins:
             impulse = np.zeros((LIMITS.short_filter + 2, 1))
             impulse[1] = 1.0
             answer = through(impulse, k, width * step)[1:, 0]
-            last = int(np.flatnonzero(np.abs(answer) > LIMITS.rounding * np.abs(answer).max())[-1])
-            if size <= last + 1 or last == LIMITS.short_filter or not self._is_even(k, width * step):
+            heard = np.flatnonzero(np.abs(answer) > LIMITS.rounding * np.abs(answer).max())
+            last = int(heard.max(initial=-1))  # of a long delay nothing is heard yet
+            lasts = last in (-1, LIMITS.short_filter)
+            if lasts or size <= last + 1 or not self._is_even(k, width * step):
                 return None
             kept, lag = answer[: last + 1], np.arange(last + 1)
             later = scipy.sparse.diags_array(kept, offsets=-lag, shape=(size, size), format="csr")
