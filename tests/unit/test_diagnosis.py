@@ -375,8 +375,8 @@ def test_a_record_of_which_hardly_a_sample_counts_is_passed_over(counts):
 @pytest.mark.parametrize(
     ("name", "values", "short"),
     [
-        ("delay", (0.0023,), True), ("delay", (0.05,), True), ("output-lag", (0.004,), True),
-        ("output-lag", (0.2,), False), ("resonance", (20.0, 0.2), False),
+        ("delay", (0.0023,), True), ("delay", (0.05,), True), ("delay", (0.9,), False),
+        ("output-lag", (0.004,), True), ("output-lag", (0.2,), False), ("resonance", (20.0, 0.2), False),
     ],
 )  # fmt: skip
 def test_a_filter_that_forgets_soon_is_a_matrix(name, values, short):

@@ -385,6 +385,8 @@ def test_the_bank_is_scored_as_piece_by_piece(seed):
             before = signals[piece == left_out]
             naive[k] += np.sum(before**2 - (before - own @ curve) ** 2, axis=0)
     np.testing.assert_allclose(dependence._falls(states, signals, piece), naive, rtol=1e-4, atol=1e-3)
+    still = dependence._falls([np.zeros_like(states[0])], signals, piece)  # a state that never changes
+    np.testing.assert_array_equal(still, np.zeros((1, 2)))
 
 
 def _triangles(turns, rates):
