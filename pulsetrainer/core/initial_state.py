@@ -130,13 +130,6 @@ def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
     return 0 if away[0] > NEAR * reach else _second_stroke(away, back, reach)
 
 
-def only_stroke(inputs: FloatArray, low: float, high: float) -> int:
-    """Where the first stroke of a record is over that begins at an end; 0 where a later one begins there."""
-    away, _, reach = _from_its_end(inputs, *_reached(inputs, low, high))
-    later = _strokes(away, inputs, reach)[1:]
-    return 0 if any(_told(one, reach) for one in later) else second_stroke(inputs, low, high)
-
-
 def _from_its_end(inputs: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray, float]:
     """How far an input (n,) is from the end that it begins at, and from the other; how far they are apart."""
     away, back = inputs - low, high - inputs

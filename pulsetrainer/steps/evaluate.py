@@ -22,7 +22,7 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.artefacts.units import counted, same_units, units_of
 from pulsetrainer.core import metrics, wild
-from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, only_stroke
+from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, second_stroke
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
@@ -36,7 +36,7 @@ from pulsetrainer.steps.one_thread import one_thread
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 _TOLD = 0.1  # % of the samples, in figures
-_MISSED = 3.0  # times the error of all that follows: a first stroke that nothing can be compared with ...
+_MISSED = 3.0  # times the error of all that follows: a first stroke that outputs do not tell from others ...
 # ... and that every model misses so far is that of a device that was never cycled before
 
 
@@ -230,10 +230,10 @@ def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int,
     begin = max(_known_from(part, dt_s, model) for model in models)
     if begin > by_input:
         return begin, left_out_words(begin - by_input)
-    only = max(only_stroke(part.input, low, high) for low, high in ends)
-    if only and all(_misses(part, only, dt_s, model) for model in models):
-        return only, (
-            f"the first stroke ({only} samples) is left out: its error is more than {_MISSED:g} times that "
+    second = max(second_stroke(part.input, low, high) for low, high in ends)
+    if second > begin and all(_misses(part, second, dt_s, model) for model in models):
+        return second, (
+            f"the first stroke ({second} samples) is left out: its error is more than {_MISSED:g} times that "
             "of all that follows, like that of a device that was never cycled before"
         )
     return begin, ""

@@ -263,6 +263,15 @@ def test_the_only_first_stroke_is_left_out_where_every_model_misses_it(size, mod
     assert {one.output.size for one in found.models} == {counted}
 
 
+@pytest.mark.parametrize(("size", "counted"), [(2.0, 1151), (0.5, 1350)])
+def test_a_first_stroke_that_later_ones_hide_is_left_out_where_every_model_misses_it(size, counted):
+    """The strokes of a piezo crept apart, and only to the models its first one stood out."""
+    other = 0.6 * (np.arange(LOOPS.size) > 1250)  # one that lies apart as well, by less
+    y = MODEL.predict(LOOPS) + _first_apart(LOOPS, 150, size) + other
+    (found,) = evaluate(Run(np.arange(y.size) / 1000.0, LOOPS, y), MODEL).models
+    assert found.output.size == counted
+
+
 def test_samples_outside_the_model_are_counted():
     """A little noise beyond the range is none; at both ends; it is said of one sample in a thousand."""
     u = U.copy()
