@@ -2177,13 +2177,21 @@ def test_a_better_model_of_a_record_that_lacks_rates_proves_nothing(monkeypatch,
 @pytest.mark.parametrize(("wrong", "direction", "name"), [(0.44, 0.74, "viscous"), (0.46, 0.74, "unknown")])
 def test_a_model_of_the_wrong_kind(monkeypatch, wrong, direction, name):
     """A speed that says much more than its direction is a viscous force; else there is no name for it."""
-    after = _given(monkeypatch, RAMP + 0.001, wrong=wrong, direction=direction)
+    after = _given(monkeypatch, RAMP + 0.001, wrong=wrong, direction=direction, left=0.2)
     assert after.verdict == name
     assert _found(after) == (["viscous", "outliers"] if name == "viscous" else ["outliers"])
     assert [one.kind for one in after.evidence] == ["wrong kind", "static"]
     if name == "viscous":
         assert after.findings[0].p_value is None
         assert after.findings[0].explains_percent == pytest.approx(100.0 * (1.0 - wrong**2))
+
+
+@pytest.mark.parametrize(("left", "of_another_kind"), [(0.101, True), (0.099, False)])
+def test_causes_that_leave_far_less_than_the_velocity_stay(monkeypatch, left, of_another_kind):
+    """A valve with a lag of 2 s, driven through its stroke in 0.6 s, was called a damper."""
+    after = _given(monkeypatch, RAMP + 0.3, wrong=0.4, left=left)
+    assert ("wrong kind" in [one.kind for one in after.evidence]) is of_another_kind
+    assert ("creep" in _found(after)) is not of_another_kind
 
 
 @pytest.mark.parametrize("wrong", [None, 0.4])
@@ -2361,7 +2369,8 @@ def test_what_lay_outside_the_range_stays_in_the_memory_and_looks_like_another_z
 )
 def test_a_model_of_the_wrong_kind_tells_of_no_change(monkeypatch, warning, wrong, changed):
     """By its own record or by these: a battery that no Preisach model describes was in another condition."""
-    after = _given(monkeypatch, RAMP + 1.0, warning=warning, wrong=wrong, verdict="none", findings=())
+    own = {"warning": warning, "wrong": wrong, "left": 0.2}
+    after = _given(monkeypatch, RAMP + 1.0, **own, verdict="none", findings=())
     assert (after.verdict == "condition-change") is changed
 
 

@@ -6,8 +6,9 @@ records.
 - If the output, of all records or of one, falls where the model rises, the polarity is reversed:
   `condition-change`, and all else is withdrawn.
 - If a mere function of the velocity describes the output much better, the model is of the wrong kind, and
-  causes sought on top of it are withdrawn. If the speed matters and not only the direction, the force is
-  `viscous`; otherwise the cause is `unknown`.
+  causes sought on top of it are withdrawn, unless they leave less than a quarter of what that function
+  leaves: a long lag at a high rate follows the velocity as well. If the speed matters and not only the
+  direction, the force is `viscous`; otherwise the cause is `unknown`.
 - If the model as given leaves less than the best model of the search, the search found only faults of its own
   coarser levels: they are withdrawn. What the given model leaves may still be more than noise, and is then
   `unknown`; otherwise the verdict is `none`, or `inconclusive` if the records lack what would show a common
@@ -75,7 +76,7 @@ def stage(state: State) -> State:
         if turned is not None and turned.left < one.speed.velocity:
             state, more = _in_another_condition(withdrawn(state), turned, judged.polarity, record)
             return replace(state, evidence=(*said, *more, *state.evidence))
-    if judged.speed.wrong:
+    if _wrong_kind(state, judged):
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
     elif _is_as_good(state, judged):
@@ -94,11 +95,17 @@ def stage(state: State) -> State:
     return replace(state, evidence=(*said, *state.evidence))
 
 
+def _wrong_kind(state: State, judged: Judged) -> bool:
+    """Whether a function of the velocity describes the output much better, and the causes found do not."""
+    with_causes = state.scale.span * state.current.rms
+    return judged.speed.wrong and with_causes > LIMITS.kind_share * judged.speed.velocity
+
+
 def _changed(state: State, judged: Judged) -> Change | None:
     """Return how the device changed since its model was made; None if it did not, or if nothing shows it."""
     assert state.question.given is not None
     fit = state.question.given.model.fit
-    if judged.speed.wrong or (fit is not None and fit.warning):
+    if _wrong_kind(state, judged) or (fit is not None and fit.warning):
         return None
     refitted = state.scale.span * state.baseline.rms
     changed = against_model(judged.measured, judged.predicted, refitted, judged.noise)
