@@ -61,6 +61,8 @@ def beyond_rails(
 
     ConvergenceError where a fit does not settle.
     """
+    if noise == 0.0:  # any fit leaves more
+        return None
     below, above = (np.where(one, np.inf, 0.0) for one in (down, up))
     fitted, left, mean, count = _likeliest(record, plane, below, above, noise, _LEAST_LEFT * noise)
     if left > _DESCRIBED * noise:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,7 +13,7 @@ from scipy.stats import truncnorm
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
 from pulsetrainer.core import censored
-from pulsetrainer.core.censored import between_steps
+from pulsetrainer.core.censored import between_steps, beyond_rails
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -159,6 +160,14 @@ def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(
     assert done.masked is not None
     assert np.all(done.masked[wanders >= rail])
     np.testing.assert_array_equal(done.output[~done.masked], cut.output[~done.masked])
+
+
+def test_without_noise_no_fit_tells_what_lies_beyond_a_rail(clean):
+    """Every fit leaves more than nothing; a division by the noise warned of it."""
+    record, up = Record(clean.input, clean.output, np.ones(clean.input.size)), clean.output > 0.75 * SPAN
+    plane = Plane.uniform(float(clean.input.min()), float(clean.input.max()), 8)
+    with warnings.catch_warnings(action="error"):
+        assert beyond_rails(record, plane, up, ~up & False, 0.0) is None
 
 
 def test_clipped_samples_are_masked_where_wild_ones_lie_beyond_them(clean, few_levels):
