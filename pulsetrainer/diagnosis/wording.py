@@ -85,8 +85,8 @@ not carried over: A Preisach model fitted anew leaves {refitted:.2g} % of the sp
 no gain: Extended by {names} and started from rest, the model would predict these recordings hardly better
     than without ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it.
 in the model: The model as given contains {names} already. Fitted again to these recordings and started from
-    rest, it would leave {extended:.3g} % of the span (rms of single samples); as given it leaves {given:.3g}
-    %. So nothing is added to it.
+    rest, it would leave {extended:.3g} % of the span (rms of single samples, less faults of the measurement);
+    as given it leaves {given:.3g} %. So nothing is added to it.
 no better: Extended by {names} and started from rest, the model would predict these recordings worse than
     without ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it.
 under way: Extended by {names} and started from rest, the model would predict these recordings worse than

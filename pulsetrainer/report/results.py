@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pulsetrainer.artefacts import Evaluation, Model, Playback, Run, Waveform
-from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
+from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS, ModelEvaluation
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.core.metrics import lacking
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -286,10 +286,19 @@ def worse(evaluation: Evaluation) -> list[str]:
     first = evaluation.models[:1]
     return [
         f"{m.name} predicts it worse than {one.name}: its rms error is {digits(-m.gain_percent)} % larger"
+        + _but_for_an_offset(m, one)
         for one in first
         for m in evaluation.models
         if m.gain_percent < -_WORSE
     ]
+
+
+def _but_for_an_offset(model: ModelEvaluation, first: ModelEvaluation) -> str:
+    """Say how much better a model is where only a constant makes it the worse one: its zero moved."""
+    own, other = model.shape_rms_percent, first.shape_rms_percent
+    if not 100.0 * (other - own) > _WORSE * other:
+        return ""
+    return f", but less a constant offset {digits(100.0 * (1.0 - own / other))} % smaller"
 
 
 def full_force(evaluation: Evaluation) -> str:

@@ -67,12 +67,15 @@ def test_a_model_alone_has_no_improvement():
 def test_a_negative_improvement_is_told_in_words():
     """On the screen and on the page: that the model is worse, and by how much; a better one is not."""
     first, better = examples.model_comparison().models
-    worse = replace(better, name="worse", gain_percent=-12.5)
+    same = first.shape_rms_percent
+    worse = replace(better, name="worse", gain_percent=-12.5, shape_rms_percent=same)
     told = Evaluation(models=(first, better, worse))
     said = f"worse predicts it worse than {first.name}: its rms error is 12.50 % larger"
     assert results.worse(told) == [said]
     header = {"title": "t", "created": "c", "provenance_json": "{}"}
     assert said in html.render_evaluation(told, **header).replace("\N{NO-BREAK SPACE}", " ")
+    moved = Evaluation(models=(first, replace(worse, shape_rms_percent=0.6 * same)))
+    assert results.worse(moved) == [f"{said}, but less a constant offset 40.00 % smaller"]
     assert results.worse(Evaluation(models=(first, better))) == []
     hardly = replace(better, name="hardly", gain_percent=-0.0132)  # 2.02 and 2.02 % in the table
     assert results.worse(Evaluation(models=(first, hardly))) == []

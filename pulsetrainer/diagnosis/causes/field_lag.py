@@ -1,4 +1,4 @@
-"""what the hysteresis sees lags behind the input (in a coil, eddy currents): P[v], tau v' + v = u."""
+"""what the hysteresis sees lags behind the input (eddy currents, filling, heat): P[v], tau v' + v = u."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class FieldLag(Late):
     """A first-order lag before the hysteresis."""
 
     id = "field-lag"
-    title = "what the hysteresis sees lags behind the {input} (in a coil, eddy currents)"
+    title = "what the hysteresis sees lags behind the {input} (eddy currents, filling, heat)"
     formula = "P[v], tau v' + v = u"
     signature = "the tips of minor loops shrink as the rate rises; an exponential tail after a stop"
     excitation = "reversals at three rates or more, spanning ten to one, with stops"
