@@ -45,16 +45,16 @@ def estimates_of(
     if columns.shape[1] == 0:
         return {}
     size = np.maximum(np.linalg.norm(columns, axis=0), TINY)
-    turned = np.linalg.pinv(columns / size) / size[:, None]
-    assert noise.noise is not None
-    variance = np.diagonal(noise.noise.covariance(fitted.projector(turned.T)))
-    left_out = held_out.jackknife(fitted)
-    if left_out is not None:
-        variance = np.maximum(variance, left_out)
-    others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
-    systematic = np.linalg.norm(np.linalg.lstsq(columns / size, others, rcond=None)[0], axis=1) / size
-    aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
-    with np.errstate(over="ignore"):  # a parameter that changes nothing lies anywhere
+    with np.errstate(over="ignore", invalid="ignore"):  # a parameter that changes nothing lies anywhere
+        turned = np.linalg.pinv(columns / size) / size[:, None]
+        assert noise.noise is not None
+        variance = np.diagonal(noise.noise.covariance(fitted.projector(turned.T)))
+        left_out = held_out.jackknife(fitted)
+        if left_out is not None:
+            variance = np.maximum(variance, left_out)
+        others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
+        systematic = np.linalg.norm(np.linalg.lstsq(columns / size, others, rcond=None)[0], axis=1) / size
+        aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
         half = np.sqrt(LIMITS.student**2 * variance + aligned**2 + systematic**2)
     found: dict[str, tuple[Estimate, ...]] = {}
     frame, at = fitted.problem.frames[0], 0
