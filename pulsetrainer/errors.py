@@ -63,6 +63,7 @@ class EndingError(UsageError):
     def __init__(self, path: Path, what: str, ending: str, *, usual: str = "out", then: str = "") -> None:
         without = "is an ending without a name" if path.name.startswith(".") else "has no such ending"
         got = f"ends in {path.suffix.lower()!r}" if path.suffix else without
+        got = "is standard output, which nothing is written to" if path.name == "-" else got
         other = path.parent / f"{path.stem.removesuffix(ending).strip('-. ') or usual}{ending}"
         super().__init__(f"{what}, but {path} {got}", hint=f"name it {shlex.quote(str(other))}{then}")
 

@@ -219,7 +219,7 @@ _WORDS_OF_A_TIRED_HAND = {
         "identify run.h5 --model model.h5 -o out.h5",
         2,
         "no option --model",
-        "--help",
+        "pulsetrainer evaluate run.h5 --model model.h5",
     ),
     "an option that is nearly one": (
         *(
@@ -248,8 +248,33 @@ _WORDS_OF_A_TIRED_HAND = {
         "give its path",
     ),
     "json before the command": (
-        *("--json show run.h5", 2, "pulsetrainer has no option --json", "after the command"),
+        *("--json show run.h5", 2, "pulsetrainer has no option --json"),
+        "after the command: pulsetrainer show run.h5 --json",
     ),
+    "an output before the command": (
+        *("-o out.h5 identify run.h5", 2, "pulsetrainer has no option -o"),
+        "after the command: pulsetrainer identify run.h5 -o out.h5",
+    ),
+    "a long dash": ("identify run.h5 –o out.h5", 2, "–o begins with a long dash", "again: -o"),
+    "a long dash for two": ("identify run.h5 —overwrite", 2, "begins with a long dash", "again: --overwrite"),
+    "a letter of an older option": ("identify run.h5 -f -o out.h5", 2, "no option -f", "or --overwrite?"),
+    "seconds for minutes": (
+        *("session --model model.h5 -o out.h5 --minutes 30s", 2, "got '30s'", "write it in min, without the"),
+    ),
+    "a share of no share": (
+        *(
+            "invert normal --model model.h5 -o out.h5 --force-max 90%",
+            2,
+            "got '90%'",
+            "and not in %; --force",
+        ),
+    ),
+    "a choice without its word": (
+        *("identify run.h5 -o out.h5 --form", 2, "needs a value: one of auto, direct, dual, signed"),
+        "write it after --form",
+    ),
+    "standard input": ("import - --input u --output y -o out.h5", 3, "standard input (-)", "to a file first"),
+    "a pattern in quotes": ("identify ru*.h5 -o out.h5", 3, "is a pattern in quotes", "leave the quotes out"),
     "an output without its name": ("identify run.h5 -o", 2, "-o needs a value: file to write", "after -o"),
     "an option in the place of a name": (
         *(
@@ -290,13 +315,13 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a drive refined over itself": ("refine drive.h5 -o drive.h5", 2, "drive.h5 (-o)", "--overwrite"),
     "an option of many letters behind one dash": (
-        *("identify run.h5 -output out.h5", 2, "there is no option -output", "-o FILE"),
+        *("identify run.h5 -output out.h5", 2, "there is no option -output", "-o out.h5"),
     ),
     "an output behind an equals sign": (
         *("identify run.h5 -o=out.h5", 2, "there is no option -o=out.h5", "-o out.h5"),
     ),
     "a column behind one dash": (
-        *("import x.csv -output force -o out.h5", 2, "no option -output", "--output names a column"),
+        *("import x.csv -output force -o out.h5", 2, "no option -output", "two dashes: --output force"),
     ),
     "help behind one dash": ("identify -help", 2, "no option -help", "pulsetrainer identify --help"),
     "a version that is a command": (
@@ -304,7 +329,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "the settings behind the command": (
         *("capture identification -o out.h5 --settings wrong.toml", 2, "has no option --settings"),
-        "pulsetrainer --settings FILE capture",
+        "pulsetrainer --settings wrong.toml capture identification -o out.h5",
     ),
     "a number in thousandths": (
         *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay 1ms", 2, "got '1ms'"),
@@ -344,7 +369,7 @@ _WORDS_OF_A_TIRED_HAND = {
             "evaluate played.h5 --bounds one.toml",
             2,
             "a pair [low, high], got 90",
-            'percent" = [81.0, 99.0], the lowest first',
+            "= [90, 100] if at least 90 is meant, [0, 90] if at most",
         ),
     ),
     "a bound of words": (
@@ -427,9 +452,9 @@ _WORDS_OF_A_TIRED_HAND = {
     "no table of such a name": (
         *("import nothing --input u --output y -o out.h5", 3, "nothing (argument", "no file here has"),
     ),
-    "a figure for a pipe": ("plot run.h5 -o -", 2, "- has no such ending", "name it figure.png"),
-    "a table for a pipe": ("export run.h5 -o -", 2, "- has no such ending", "name it table.csv"),
-    "a model for a pipe": ("identify run.h5 -o -", 2, "- has no such ending", "name it out.h5"),
+    "a figure for a pipe": ("plot run.h5 -o -", 2, "- is standard output", "name it figure.png"),
+    "a table for a pipe": ("export run.h5 -o -", 2, "- is standard output", "name it table.csv"),
+    "a model for a pipe": ("identify run.h5 -o -", 2, "- is standard output", "name it out.h5"),
     "a table for a device": ("export run.h5 -o /dev/full", 2, "/dev/full is not an ordinary file", "on disk"),
     "settings without an ending": (
         *("tune -o pulsetrainer", 2, "pulsetrainer has no such ending", "name it pulsetrainer.toml"),
@@ -494,10 +519,51 @@ TABLES = {
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
     "bare.csv": "0,0.1,2\n1,0.2,3\n2,0.3,4\n",
     "back.csv": "Time,I [A],F [N]\n2024-01-01 10:00:03,0.1,1\n2024-01-01 10:00:02,0.2,2\n",
+    "heads.csv": "Channel,CH1,CH2\nTime,Current,Force\n0,1,2\n1,2,3\n2,3,4\n3,2,3\n",
+    "cells.csv": "t,I,F\n0,5mA,1N\n1,6mA,2N\n2,7mA,3N\n",
+    "my pulse.csv": "t_s,force_N\n0,0\n1,1\n2,0\n",
     "twice.csv": "t,x,x\n0,1,2\n1,2,3\n",
     "excel.csv": "Zeit (s);Strom (A);Kraft (N)\n0,000;0,10;1.234,5\n0,001;0,20;1.235,5\n",
 }
 INSIDE = {
+    **{
+        f"{unit} for {meant}": Mistake(
+            (
+                *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--input-unit", unit),
+                *("-o", "out.h5"),
+            ),
+            *(3, f"'{unit}' is not a known unit", f"did you mean '{meant}'? Write --input-unit {meant}\n"),
+        )
+        for unit, meant in (("v", "V"), ("n", "N"), ("ma", "mA"), ("kpa", "kPa"))
+    },
+    "a run and a model exchanged": Mistake(
+        ("diagnose", "model.h5", "--model", "run.h5", "-o", "out.h5"),
+        *(3, "expected a run, got a model", "pulsetrainer diagnose run.h5 --model model.h5 -o out.h5"),
+    ),
+    "two lines of headings": Mistake(
+        ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "-o", "out.h5"),
+        *(3, "is in 'Time', expected s", "keep one line of headings"),
+    ),
+    "two lines of headings, and a rate": Mistake(
+        ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "--rate", "10", "-o", "out.h5"),
+        *(
+            3,
+            "the line below the heading 'CH1' of heads.csv",
+            "keep one line of headings, or give --input-unit",
+        ),
+    ),
+    "cells with their units": Mistake(
+        ("import", "cells.csv", "--input", "I", "--output", "F", "-o", "out.h5"),
+        *(3, "in column I: '5mA' in line 2", "write it in the heading: 'I [mA]'"),
+    ),
+    "a table with a blank in its name, nearly": Mistake(
+        ("invert", "my pulses.csv", "--model", "model.h5", "-o", "out.h5"),
+        *(3, "my pulses.csv (argument", "did you mean 'my pulse.csv'? Or name a pulse"),
+    ),
+    "a limit of a check": Mistake(
+        ("check", "model.h5", "--limit-current", "0.005"),
+        *(3, "the limit in force is 0.005 A", "give --limit-current 1.5, or leave it out; or identify again"),
+    ),
     "a drive as a run": Mistake(
         ("identify", "drive.h5", "-o", "out.h5"), 3, "got a drive", "run files beside it: run.h5"
     ),
@@ -565,7 +631,7 @@ INSIDE = {
         ("evaluate", "played.h5", "--bounds", "bounds.toml"),
         2,
         "normal.continuous.mean_err",
-        "A name here is normal.continuous, a point, and one of mean_error_reduction_percent",
+        "A name here is normal.continuous, a dot, and one of mean_error_reduction_percent",
     ),
     "learnt from a drive that was not refined": Mistake(
         ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
@@ -620,13 +686,13 @@ INSIDE = {
         ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
         *(
             3,
-            "between two samples the signal would move by 1e+06, more than its whole range of 1.5",
-            "a lower --speed, or a higher --rate",
+            "at 1e+09 A/s (--speed) the signal would move by 1e+06 A between two samples",
+            "a lower --speed (0.75 is usual), or a higher --rate",
         ),
     ),
     "a speed that takes for ever": Mistake(
         ("capture", "identification", "-o", "out.h5", "--speed", "1e-9"),
-        *(3, "the signal would have 7.35e+13 samples, expected at most 1e+08", "give a higher --speed"),
+        *(3, "it goes 73.5 A at 1e-09 A/s (--speed)", "give a higher --speed (0.75 is usual)"),
     ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
@@ -637,7 +703,7 @@ INSIDE = {
         *(
             3,
             "playing this would heat the coil to 108 % of its limit, even from cold",
-            "fewer --levels, --repeats or --periods), or at a lower current; ",
+            "fewer --levels or --repeats, or a lower --current-max; ",
         ),
     ),
     "a pulse whose time stands still": Mistake(
@@ -645,7 +711,7 @@ INSIDE = {
     ),
     "a force limit that nothing keeps": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--limit-force", "0.5"),
-        *(4, "a force of 13.6 N is predicted", "raise --limit-force, or capture again with a lower"),
+        *(4, "a force of 13.6 N is predicted", "raise --limit-force to 14 or more, or"),
     ),
     "a heading of a table without headings": Mistake(
         ("import", "bare.csv", "--input", "current_A", "--output", "force_N", "-o", "out.h5"),
@@ -692,7 +758,7 @@ INSIDE = {
     ),
     "a rate that no heart has": Mistake(
         ("session", "--model", "model.h5", "-o", "out.h5", "--rate", "1000"),
-        *(2, "a rate of 1000 beats a minute is outside 20 to 240", "a usual rate is 75"),
+        *(2, "--rate must be 20 to 240 beats a minute, got 1000", "a usual rate is 75"),
     ),
     "a bench parameter that is no number": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?seed=abc"),

@@ -61,6 +61,7 @@ MESSAGES = {
     "no sound provenance": Message("the provenance is not", "", "{file}"),
     "no provenance": Message("'provenance' is missing", "", "{file}"),
     "not writable": Message("not writable", "", "{folder}"),
+    "write-protected": Message("is write-protected", "chmod u+w {file}", "{file}"),
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "name one of these", "{file}", "force_N", "t_s, current_A"),
@@ -95,8 +96,8 @@ MESSAGES = {
     # --- numbers -----------------------------------------------------------------------------------------
     "force out of reach": Message("is asked for", "--force-max", expected="reaches 0.5", got="40 N"),
     "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
-    "too slow": Message("the signal would have", "speed", got="{got} samples"),
-    "too fast": Message("between two samples", "speed", expected="1.5", got="1e+297"),
+    "too slow": Message("the signal would have", "(0.75 is usual)", got="{got} samples"),
+    "too fast": Message("between two samples", "(0.75 is usual)", expected="1.5", got="1e+297"),
     "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
     "too many samples": Message(
         "samples", "at most", expected="more than {most}", got="{times} times {samples}"
@@ -117,7 +118,7 @@ MESSAGES = {
     "did not settle": Message("did not settle", "", expected="within {steps}"),
     "no beat of that number": Message("no beat", "from 1 to {count}", got="{count} whole beats"),
     "no whole beat": Message("no whole beat", ""),
-    "no such unit": Message("{argument}", "{argument}", "{place}"),
+    "no such unit": Message("is not a known unit", "{argument}", "{place}"),
     "provenance itself": Message("provenance", ""),
     "no time zone": Message("time zone", "datetime.now"),
     "cannot be read": Message("cannot be read", "", "{file}"),
@@ -125,6 +126,7 @@ MESSAGES = {
     "does not repeat": Message("does not repeat", "diagnose"),
     "another model": Message("is not the model", "pulsetrainer diagnose"),
     "delay too long": Message("is only", "seconds", expected="{length}", got="a delay of {given}"),
+    "another kind of device": Message("takes", "captured on the device", "the model {file}", "(A and N)"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),
     "nothing to draw": Message("nothing to draw", ""),
     "no figure of it": Message("no figure", "", got="{got}"),
@@ -143,7 +145,7 @@ MESSAGES = {
     "no such signal": Message("signal", "pulsetrainer capture", expected="diagnostic", got="noise"),
     "no such bench parameter": Message("parameter", "creep", "{asked}: the bench", got="'crep'"),
     "one evaluation": Message("at least two", "pulsetrainer compare"),
-    "nothing in common": Message("in common", "evaluat"),
+    "nothing in common": Message("in common", "evaluat", "fit.h5 is of a run"),
     # --- settings ----------------------------------------------------------------------------------------
     "no such setting": Message("setting", "{next}", "pulsetrainer.toml", got="'{got}'"),
     "not such a setting": Message(
@@ -189,7 +191,7 @@ MESSAGES = {
     "force reading": Message("force", "sensor"),
     "tick-overrun": Message("missed its tick", "firmware is too slow", "during the capture", got=KEPT),
     "reset": Message("restarted in mid-play (cause: external)", "power supply", got=KEPT),
-    "no whole repeat": Message("no repeat was whole", "power supply", got="{file} was not written"),
+    "no whole repeat": Message("restarted in mid-play", "power supply", got="{file} was not written"),
     "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),
     "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
@@ -236,6 +238,7 @@ NOTES = {
     "seen before": ("was identified from", "a run that neither has seen"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
+    "no time that can be read": ("has no time column (its column date", "as time: '1 Nov 2026')"),
     "nothing gained": ("in 1 pass:", "none was better than the first"),
     "follows half the range": ("% of 0.75 A",),
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),

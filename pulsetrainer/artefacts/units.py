@@ -35,6 +35,7 @@ _SUFFIXES = """
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
 """
 _PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
+_USUAL_FIRST = (*_SUFFIXES.split(), *_PREFIXED_SYMBOLS.split(), *_BARE_SYMBOLS.split())
 _BEHIND_A_NAME = frozenset(_SUFFIXES.split())
 # as oscilloscopes and people spell them
 _SPELLED = {
@@ -102,21 +103,23 @@ def _is_symbol(text: str) -> bool:
     return any(text.startswith(p) and text[len(p) :] in _PREFIXED for p in _PREFIXES)
 
 
-def check_unit(text: str, what: str, where: str = "") -> str:
+def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
     """Return a unit as it is written; the two letters that look like a micro are one.
 
     DataError where it is none; ``what`` is the option for it, ``where`` what it was read from, if anything
-    ("the heading 'Force (measured)' of scope.csv").
+    ("the heading 'Force (measured)' of scope.csv"), ``remedy`` what may be done but giving the unit.
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
-    spelled = _SPELLED.get(text.lower())
-    near = [spelled] if spelled else difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
+    capitals = (unit for unit in _USUAL_FIRST if unit.lower() == text.lower())  # or their lack
+    meant = _SPELLED.get(text.lower()) or next(capitals, "")
+    likely = [] if where else difflib.get_close_matches(text, _USUAL_FIRST, n=2, cutoff=0.5)
+    near = [meant] if meant else list(dict.fromkeys(likely))  # a heading may have any word there
     raise DataError(
-        f"{what} {text!r}{where and ' in '}{where} is not a known unit",
+        f"{text!r} in {where} is not a known unit" if where else f"{what} {text!r} is not a known unit",
         hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
         if near
-        else f"give {what}, such as N or mm/s^2; 1 stands for a pure number",
+        else f"{remedy}give {what}, such as N or mm/s^2; 1 stands for a pure number",
     )
 
 

@@ -44,7 +44,7 @@ def check(
         )
     job = Job(context, inputs=(model,), outputs=(out,))
     from pulsetrainer.report.results import checked
-    from pulsetrainer.steps.check import GAIN, OFFSET_N, check_updatable, hindrance, updated
+    from pulsetrainer.steps.check import AGAIN, GAIN, OFFSET_N, check_updatable, hindrance, updated
 
     loaded = job.load(model, pt.Model)
     if update:
@@ -66,6 +66,6 @@ def check(
         if job.port:
             rows["next"] += f" --port {shlex.quote(job.port)}"
     elif found.verdict != "true":
-        rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
+        rows["next"] = AGAIN
     job.show(plain(found) | {"output": out}, f"{model} on {info.serial}: {title}", rows)
     job.wrote(out)

@@ -13,8 +13,8 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.next_step import free
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.files.output_name import free
 from pulsetrainer.steps.arguments import check_once
 
 

@@ -10,6 +10,7 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.files.input_file import likely_kind
 
 
 def extend(
@@ -36,6 +37,8 @@ def extend(
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
         plain = job.load(model, pt.Model)
+        made_from = map(Path, store.read_header(diagnosis).provenance.inputs)
+        context.params["runs"] = [path for path in made_from if likely_kind(path) == "run"]  # for hints
         other = None if verify is None else job.load(verify, pt.Run)
         extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))
         added = [one.cause for one in extended.extensions]

@@ -9,7 +9,6 @@ import io
 import json
 import logging
 import os
-import re
 import signal
 import sys
 import traceback
@@ -23,12 +22,8 @@ from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import check_apart, usage_of
 from pulsetrainer.errors import TRY, DataError, Interrupted, PulsetrainerError, UsageError
+from pulsetrainer.report.spelling import in_letters
 
-# where a terminal has no Unicode: as the importer reads units
-_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
-_IN_LETTERS = str.maketrans(
-    {"µ": "u", "μ": "u", "Ω": "Ohm", "°": "deg", "·": "*", "×": "x", "±": "+-", "−": "-"}
-)
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _READER_GONE = 141  # as a shell tells SIGPIPE
 _STOPPED = "stopped by you; what was not finished was not written"
@@ -110,20 +105,9 @@ def end_like_ctrl_c() -> None:
             signal.signal(number, interrupt)
 
 
-def _in_letters(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Spell what an encoding lacks: ``N^2`` for N², an escape where there is no spelling."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    lacking = error.object[error.start : error.end]
-    spelled = re.sub(
-        "[⁰¹²³⁴-⁹⁻⁺]+", lambda power: "^" + power[0].translate(_RAISED), lacking.translate(_IN_LETTERS)
-    )
-    return spelled.encode("ascii", "backslashreplace").decode("ascii"), error.end
-
-
 def speak_any_encoding() -> None:
     """Let a terminal or pipe without Unicode show what it cannot spell in letters, instead of failing."""
-    codecs.register_error("in letters", _in_letters)
+    codecs.register_error("in letters", in_letters)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             spelled = stream.encoding.lower().replace("-", "") == "utf8" and stream.errors != "strict"

@@ -7,6 +7,7 @@ import difflib
 import re
 import shlex
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +15,11 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
-from pulsetrainer.cli.next_step import as_options, next_step, to_make, with_files
-from pulsetrainer.cli.usage import spaced
+from pulsetrainer.cli.next_step import HOLDS, as_options, next_step, the_other_way, to_make, with_files
 from pulsetrainer.cli.values import check_finite, named, set_by
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError, in_words
-from pulsetrainer.files.input_file import is_sound, near_names
+from pulsetrainer.files.input_file import cut_off, is_sound, near_names, spaced
 from pulsetrainer.files.pulses import library
-
-# what the file of an argument holds; others take any artefact, or a table
-_HOLDS = {
-    "model": ("model",),
-    "run": ("run",),
-    "runs": ("run",),
-    "verify": ("run",),
-    "drive": ("waveform",),
-    "diagnosis": ("diagnosis",),
-    "inputs": ("playback", "session"),
-    "evaluations": ("evaluation", "session"),
-    "file": (),
-}
 
 # of commands that take a run: what to do instead of making one in the usual way
 _DIAGNOSTIC = "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table"
@@ -58,6 +45,7 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse; UsageError where an option of one file was given twice, or what is typed names no file."""
+        ctx.meta[__name__] = args[:]
         if ctx.resilient_parsing:  # a line that is completed is not all there
             return super().parse_args(ctx, args)
         try:
@@ -106,9 +94,19 @@ class Command(TyperCommand):
                 given = _given_as(ctx, error.path, to_write=isinstance(error, ExistsError))
                 if given is not None:
                     _name(error, given, ctx)
+            error.message = _with_file(error.message, ctx.params)
             error.hint = with_files(error.hint, ctx.params)
+            if exchanged := the_other_way(error, ctx.params, ctx.meta[__name__]):
+                error.hint = f"exchange the two: pulsetrainer {ctx.info_name} {exchanged}"
             _tell_who_set_it(error, ctx)
             raise
+
+
+def _with_file(said: str, given: Mapping[str, Any]) -> str:
+    """Return a message with the file of the model, the drive or the bounds that it begins with."""
+    found = re.match(r"the (model|drive|bounds) (?=takes |is of |name )", said)
+    file = given.get(found[1]) if found else None
+    return f"{found[0]}{file} {said[found.end() :]}" if found and isinstance(file, str | Path) else said
 
 
 def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
@@ -160,7 +158,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     """Say which argument it is, and for an input which files of its kind are near."""
     name, command = given.name or "", context.info_name or ""
     option = next((one for one in given.opts if one.startswith("-")), "")
-    kinds, folder = _HOLDS.get(name), error.path.parent
+    kinds, folder = HOLDS.get(name), error.path.parent
     word = str(given.human_readable_name).partition("|")[0].rstrip(".")
     word = word.upper() if word.islower() else word  # as in the help, where it is given no other
     if name == "inputs" and context.params.get("model"):  # then it is models on a run
@@ -174,7 +172,8 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     if isinstance(error, AbsentError) and name in _TABLES:
         tables = sorted(path.name for path in folder.glob("*.csv") if is_sound(path))
         near = difflib.get_close_matches(error.path.name, tables, n=1, cutoff=_NEAR)
-        error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
+        meant = f"did you mean {shlex.quote(str(error.path.with_name(near[0])))}? Or " if near else ""
+        error.hint = meant + _TABLES[name]
         return
     if isinstance(error, ExistsError) and command == "capture":
         error.hint = f"{next_step(error)}; --resume continues an interrupted recording"
@@ -184,7 +183,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
-    if hint := _several(error.path, given, option) or _cut_off(error.path):
+    if hint := _several(error.path, given, option) or cut_off(error.path):
         error.hint = hint
         return
     where = "here" if folder == Path() else f"in {folder}"
@@ -207,11 +206,3 @@ def _several(path: Path, given: Any, option: str) -> str:
     if not given.multiple and given.nargs != -1:
         return "name one file"
     return "name them one by one: " + " ".join(f"{option} {shlex.quote(str(file))}".strip() for file in files)
-
-
-def _cut_off(path: Path) -> str:
-    """Name what a recording left that was cut off before it had this name; empty where there is none."""
-    if path.suffix == ".partial" and path.with_suffix("").is_file():
-        return f"it was not cut off: {shlex.quote(str(path.with_suffix('')))} is whole"
-    left = path.with_name(f"{path.name}.partial")
-    return f"it was cut off: {shlex.quote(str(left))} holds what there is" if left.is_file() else ""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pulsetrainer import errors
-from pulsetrainer.files.input_file import near_names
+from pulsetrainer.files.input_file import likely_kind, near_names
+from pulsetrainer.files.output_name import free
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
 
@@ -55,7 +55,7 @@ def next_step(problem: errors.PulsetrainerError) -> str:
     if isinstance(problem, errors.ExistsError) and problem.hint == errors.ExistsError.usual:
         other = shlex.quote(str(free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
-    if isinstance(problem, errors.WrongKindError):
+    if isinstance(problem, errors.WrongKindError) and problem.hint.endswith(" instead"):  # nobody knew better
         return _after_wrong_kind(problem)
     if isinstance(problem, errors.DamagedFileError):
         known = problem.artefact in MAKES
@@ -80,12 +80,6 @@ def to_make(kind: str, path: Path) -> str:
     return f"{line} {shlex.quote(str(path))}"
 
 
-def free(path: Path) -> Path:
-    """Return a path, or, where it is taken, a name like it that is not."""
-    others = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in itertools.count(2))
-    return next(other for other in itertools.chain((path,), others) if not other.exists())
-
-
 _PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the unit at its end
 
 
@@ -93,6 +87,19 @@ def as_options(text: str) -> str:
     """Return a text with the parameters in it as options: ```force_min_N``` is ``--force-min`` here."""
     return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", text)
 
+
+# what the file of an argument holds; others take any artefact, or a table
+HOLDS = {
+    "model": ("model",),
+    "run": ("run",),
+    "runs": ("run",),
+    "verify": ("run",),
+    "drive": ("waveform",),
+    "diagnosis": ("diagnosis",),
+    "inputs": ("playback", "session"),
+    "evaluations": ("evaluation", "session"),
+    "file": (),
+}
 
 # what a hint calls a file that the command line may name: the parameter that does
 _PLACEHOLDERS = {
@@ -112,6 +119,21 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
         if isinstance(given, str | Path):
             text = text.replace(placeholder, shlex.quote(str(given)))
     return text
+
+
+def the_other_way(
+    problem: errors.PulsetrainerError, parameters: Mapping[str, Any], words: Sequence[str]
+) -> str:
+    """Return words with two files exchanged, where each is what the other should be; else empty."""
+    if not isinstance(problem, errors.WrongKindError):
+        return ""
+    for name, kinds in HOLDS.items():
+        given = parameters.get(name)
+        other = Path(given) if isinstance(given, str | Path) else Path()
+        if problem.found in kinds and likely_kind(other) in problem.expected:
+            there = {problem.path: other, other: problem.path}
+            return shlex.join(str(there.get(Path(word), word)) for word in words)
+    return ""
 
 
 def _after_wrong_kind(problem: errors.WrongKindError) -> str:

@@ -66,7 +66,7 @@ def play(
         except PulsetrainerError as error:
             if not isinstance(error.kept, pt.Playback):
                 if isinstance(error, DeviceError | Interrupted):
-                    error.message += f"; no repeat was whole, {out} was not written"
+                    error.message += f"; {out} was not written"
                     error.hint = error.hint or "run the command again"
                 raise
             stopped, played = error, error.kept

@@ -11,6 +11,7 @@ from typing import Any
 
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.input_file import columns_of, spaced
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -41,8 +42,10 @@ _NO_OPTION = {
     "check --model": "give the model without an option: pulsetrainer check model.h5",
     "play --model": "leave it out: a drive holds the model that it was made with",
     "refine --model": "leave it out: a drive holds the model that it was made with",
+    "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
     "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
+_LONG_DASHES = "\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 
@@ -59,14 +62,11 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
     if kind == "NoSuchOption":
         given = _as_typed(str(getattr(error, "option_name", "")), words)
         near = _alike(given, context)
-        hint = f"did you mean {' or '.join(near)}?" if near else help_
-        if given == "--settings":
-            behind = command.removeprefix("pulsetrainer")
-            hint = f"put it before the command: pulsetrainer --settings FILE{behind}"
-        elif given == "--json" and command == "pulsetrainer":
-            hint = "put it after the command: pulsetrainer show FILE.h5 --json"
-        hint = _NO_OPTION.get(f"{command.rpartition(' ')[2]} {given}", hint)
-        return UsageError(f"{command} has no option {given}", hint=hint)
+        hint = f"did you mean {' or '.join(near)}?" if near else _elsewhere(given, context, words) or help_
+        name = command.rpartition(" ")[2]
+        behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
+        known = _NO_OPTION.get(f"{name} {given}", "").format(behind=behind)
+        return UsageError(f"{command} has no option {given}", hint=known or hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
@@ -85,14 +85,22 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
 def check_apart(words: Sequence[str]) -> None:
     """UsageError for ``-output x.h5`` and ``-o=x.h5``: to the parser they name the files utput and =x.h5.
 
-    And for ``--show-completion zsh``, which takes no value.
+    And for the long dash of a word processor, and ``--show-completion zsh``, which takes no value.
     """
-    for word in words[: words.index("--") if "--" in words else None]:
+    typed = words[: words.index("--") if "--" in words else None]
+    for word, behind in zip(typed, (*typed[1:], "FILE"), strict=False):
         if word.startswith(("-ou", "-o=")):
-            name = word.partition("=")[2] or "FILE"
+            name = shlex.quote(word.partition("=")[2] or behind)
             raise UsageError(
                 f"there is no option {word}: give the file to write after -o and a space",
-                hint=f"-o {shlex.quote(name)}" + "; --output names a column" * ("import" in words),
+                hint=f"-o {name}" + f"; for a column, two dashes: --output {name}" * ("import" in words),
+            )
+        if word.startswith(tuple(_LONG_DASHES)) and not Path(word).exists():
+            short = word.lstrip(_LONG_DASHES)
+            dash = "-" if len(short) == 1 or short[:1].isdigit() else "--"
+            raise UsageError(
+                f"{word} begins with a long dash, as a word processor makes it, and is no option",
+                hint=f"type the dash again: {dash}{short}",
             )
     first, second = (*words, "", "")[:2]  # typer asks the surroundings for the shell, not the words
     if first in ("--show-completion", "--install-completion") and second:
@@ -102,6 +110,20 @@ def check_apart(words: Sequence[str]) -> None:
             if second in _SHELLS
             else f"write {first} alone",
         )
+
+
+def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
+    """Return the line with an option on the side of the command that it belongs to; else empty."""
+    commands = getattr(getattr(context, "command", None), "commands", {})
+    at = next(k for k, word in enumerate(words) if word.partition("=")[0] == option)
+    if option == "--settings":
+        end, side = at + 1 + ("=" not in words[at]), "before"
+        line = [*(*words, "FILE")[at:end], *words[:at], *words[end:]]
+    else:
+        own = {name for name, one in commands.items() if any(option in param.opts for param in one.params)}
+        end, side = next((k for k, word in enumerate(words) if k > at and word in own), at), "after"
+        line = [*words[:at], *words[end:], *words[at:end]]
+    return f"put it {side} the command: {shlex.join(['pulsetrainer', *line])}" if line != [*words] else ""
 
 
 def _as_typed(option: str, words: Sequence[str]) -> str:
@@ -118,7 +140,7 @@ def _alike(given: str, context: Any) -> list[str]:
     offered = [one for one in params if not getattr(one, "hidden", False)]
     names = [name[2:] for one in offered for name in one.opts if name.startswith("--")]
     if len(given) == 2:
-        near = [name for name in names if name.startswith(given[1:])]
+        near = [name for name in names if name.startswith(given[1:]) or (given, name) == ("-f", "overwrite")]
     else:
         typed = given.lstrip("-").lower()
         near = difflib.get_close_matches(typed, names, n=2) or [n for n in names if n.startswith(typed)]
@@ -132,7 +154,7 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     given: list[Path] = (context.params.get("files") or []) if context is not None else []
     if given and parameter.name in ("input_column", "output_column"):
         try:
-            columns = _columns(Path(given[0]))
+            columns = columns_of(Path(given[0]))
         except DataError as error:  # which weighs more than what is missing
             return UsageError(f"{error.message}; and {said}", hint=error.hint)
         if len(columns) > 1:
@@ -148,26 +170,10 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
-    meaning = next((f": {meaning_of(one).partition(';')[0]}" for one in params if option in one.opts), "")
+    one = next((one for one in params if option in one.opts), None)
+    choices = ", ".join(getattr(getattr(one, "type", None), "choices", ()))
+    meaning = f": one of {choices}" if choices else f": {meaning_of(one).partition(';')[0]}" if one else ""
     return UsageError(f"{option} needs a value{meaning}", hint=f"write it after {option}, or see {help_}")
-
-
-def spaced(words: Sequence[str]) -> str:
-    """Return the file whose name has spaces in it and was typed without quotes, in quotes; else empty."""
-    runs = (" ".join(words[i:j]) for i in range(len(words)) for j in range(i + 2, len(words) + 1))
-    return next((shlex.quote(run) for run in runs if Path(run).is_file()), "")
-
-
-def _columns(table: Path) -> tuple[str, ...]:
-    """Return the columns of a table that is to be imported; DataError where there is none to be read."""
-    from pulsetrainer.files.input_file import check_file
-
-    check_file(table)  # before what is slow to import
-    from pulsetrainer.files.array_files import reader_of
-    from pulsetrainer.files.csv_dialect import detect
-
-    reads = reader_of(table)
-    return tuple(reads(table).values) if reads else detect(table).names
 
 
 def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:

@@ -14,6 +14,7 @@ from pulsetrainer.files.settings import SETTINGS
 
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
+_SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 _UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
 
@@ -95,8 +96,11 @@ def _as_a_number(parameter: Any, must: str) -> str:
             "; or, of a model in other units, in its own" if f"{said[1]} or " in meaning_of(parameter) else ""
         )
         return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}{other}"
-    # what is typed in ms must not be taken for s
-    return f"write the number alone, without a unit; {named(parameter)} is: {meaning_of(parameter)}"
+    if said and {unit, said[1]} <= _SECONDS.keys():
+        factor = _SECONDS[unit] / _SECONDS[said[1]]
+        return f"write it in {said[1]}, without the unit: {float(number) * factor:g}"
+    # what is typed in % must not be taken for N
+    return f"write it without a unit, and not in {unit}; {named(parameter)} is: {meaning_of(parameter)}"
 
 
 def _choice(parameter: Any, must: str) -> str:

@@ -14,6 +14,7 @@ from pulsetrainer.errors import ArgumentError
 
 MOST_SAMPLES = 100_000_000  # of one signal: a day at 1 kHz
 
+_USUAL_SPEED = 0.75  # A/s: slow against the coil and the lag of the force
 _DUST = 1e-12  # of the largest point: closer than this two points are one
 
 
@@ -65,8 +66,9 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
     if not steps <= MOST_SAMPLES or not np.isfinite(speed / rate_Hz):
         raise ArgumentError(
             f"the signal would have {steps:.3g} samples, expected at most {MOST_SAMPLES:.3g}: it goes "
-            f"{distance[-1]:.3g} at {speed:g} a second, {rate_Hz:g} samples a second",
-            hint="give a higher `speed_A_per_s`, a lower `rate_Hz` or a smaller range",
+            f"{distance[-1]:.3g} A at {speed:g} A/s (`speed_A_per_s`), {rate_Hz:g} samples a second",
+            hint=f"give a higher `speed_A_per_s` ({_USUAL_SPEED:g} is usual), a lower `rate_Hz` or a "
+            "smaller range",
         )
     # a turn between two samples would be cut short: put it on the nearest sample, each turn on one of its own
     apart = np.abs(np.diff(points)) > _DUST * np.abs(points).max()
@@ -92,20 +94,20 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
     step from one sample to the next that is wider than the range.
     """
     edges = Plane.uniform(low, high, n_h).edges
-    _check_step(speed / rate_Hz if rate_Hz > 0 else 0.0, high - low)
+    _check_step(speed, rate_Hz, high - low)
     bottoms = edges[-2::-1]
     turns = np.empty(2 * n_h + 1)
     turns[0], turns[1::2], turns[2::2] = low, high, bottoms
     return Signal(through(turns, speed, rate_Hz), rate_Hz, "identification")
 
 
-def _check_step(step: float, reach: float) -> None:
+def _check_step(speed: float, rate_Hz: float, reach: float) -> None:
     """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
-    if step > reach:
+    if rate_Hz > 0 and speed / rate_Hz > reach:
         raise ArgumentError(
-            f"between two samples the signal would move by {step:.3g}, more than its whole range of "
-            f"{reach:.3g}",
-            hint="give a lower `speed_A_per_s`, or a higher `rate_Hz`",
+            f"at {speed:g} A/s (`speed_A_per_s`) the signal would move by {speed / rate_Hz:.3g} A between "
+            f"two samples, more than its whole range of {reach:.3g} A",
+            hint=f"give a lower `speed_A_per_s` ({_USUAL_SPEED:g} is usual), or a higher `rate_Hz`",
         )
 
 
@@ -163,7 +165,7 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     """
     ascending(low, high)
     positive(rate=rate_Hz)
-    _check_step(max(_RATES) / rate_Hz * (high - low), high - low)
+    _check_step(max(_RATES) * (high - low), rate_Hz, high - low)
     parts: list[FloatArray] = []
 
     def go(points: tuple[float, ...], ranges_per_s: float) -> None:

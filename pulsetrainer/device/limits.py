@@ -122,7 +122,7 @@ def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str = "") -> No
     hint = hint or less_current(f"`current_max_A` at most {limit_A:g}")
     peak = float(np.max(reference_A, initial=0.0))
     if limit_A < CURRENT_A and peak <= CURRENT_A + codes.CURRENT_UNIT_A / 2:
-        hint = f"raise `limit_current_A` to {peak:.4g} where it was lowered, or {hint}"
+        hint = f"where it was lowered, give `limit_current_A` {peak:.4g}, or leave it out; or {hint}"
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(
             f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint
@@ -146,9 +146,11 @@ def check_force(
         told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * limit_N))]) / 100
         known = foretold_N is not None and told_A > 0
         lower = f"`current_max_A` at most {told_A:g}" if known else "a lower `current_max_A`"
+        enough = math.ceil(most)
+        raised = f"raise `limit_force_N` to {enough} or more, or " if enough <= FORCE_N else ""
         raise DeviceError(
             f"the device would stop: a force of {most:.3g} N is predicted, and its limit is {limit_N:g} N",
-            hint=f"raise `limit_force_N`, or {less_current(lower)}",
+            hint=raised + less_current(lower),
         )
 
 
@@ -210,22 +212,26 @@ def less_current(than: str) -> str:
     )
 
 
-def _bearable_wait_s(heat: float, reference_A: FloatArray, rate_Hz: float) -> float:
+def _bearable_wait_s(
+    heat: float,
+    reference_A: FloatArray,
+    rate_Hz: float,
+    hint: str = "play less of it at a time, or at a lower current; a drive of fewer periods is shorter",
+) -> float:
     """Return ``heat.wait_s``; ArgumentError for a reference (n,) that even a cold coil does not bear."""
     seconds = wait_s(heat, reference_A, rate_Hz)
     if math.isinf(seconds):
         share = 100.0 * float(course(0.0, reference_A, rate_Hz).max())
         raise ArgumentError(
             f"playing this would heat the coil to {math.ceil(share)} % of its limit, even from cold",
-            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), or at a lower current; "
-            "with few levels a higher `speed` helps too",
+            hint=hint,
         )
     return seconds
 
 
-def check_ever_cool(reference_A: FloatArray, rate_Hz: float) -> None:
-    """Raise ArgumentError for a reference (n,) in A that even a cold coil does not bear."""
-    _bearable_wait_s(0.0, reference_A, rate_Hz)
+def check_ever_cool(reference_A: FloatArray, rate_Hz: float, hint: str) -> None:
+    """Raise ArgumentError, with this hint, for a reference (n,) in A that even a cold coil does not bear."""
+    _bearable_wait_s(0.0, reference_A, rate_Hz, hint)
 
 
 def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed: bool) -> None:

@@ -23,7 +23,7 @@ def check_output(path: Path | str, overwrite: bool = False) -> None:
 
     It exists and ``overwrite`` is not set, its folder is missing or not writable, or its name ends in
     a blank.
-    DataError where the disk has no room for another file.
+    DataError where the disk has no room for another file, or the output is write-protected.
     """
     path = Path(path)
     if path.name != path.name.strip():
@@ -60,6 +60,11 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
     if path.exists() and not overwrite:
         raise ExistsError(path)
+    if path.exists() and not os.access(path, os.W_OK):
+        raise DataError(
+            f"the output {path} is write-protected",
+            hint=f"name another file, or allow it: chmod u+w {shlex.quote(str(path))}",
+        )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(
             f"the output {path} cannot be written: the folder {folder} is not writable",

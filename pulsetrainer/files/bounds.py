@@ -30,17 +30,19 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                 bounds[name] = float(low), float(high)
             case _:
                 usual = [90.0, 100.0]
-                with contextlib.suppress(TypeError, ValueError):  # the wrong way round, in quotes, or one
-                    low, high = sorted(
-                        map(float, pair if isinstance(pair, list) else (0.9 * pair, 1.1 * pair))
-                    )
+                with contextlib.suppress(TypeError, ValueError):  # the wrong way round, or in quotes
+                    low, high = sorted(map(float, pair))
                     if math.isfinite(high - low):
                         usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
                 tables = re.search(r"^\s*\[", path.read_text(encoding="utf-8"), re.MULTILINE)
                 key = name.rpartition(".")[2] if tables else json.dumps(name)
+                hint = f"write {key} = {usual}, the lowest first"
+                if type(pair) in (int, float):
+                    least = f"[{pair}, {100 if pair <= 100 else 'inf'}] if at least {pair} is meant"
+                    hint = f"write {key} = {least}, [0, {pair}] if at most"
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {key} = {usual}, the lowest first" if "." in name else _HOW,
+                    hint=hint if "." in name else _HOW,
                 )
     if not bounds:
         raise UsageError(f"{path} has no bounds in it, so nothing would be checked", hint=_HOW)

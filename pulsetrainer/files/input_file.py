@@ -55,6 +55,15 @@ def _first_bytes(path: Path) -> bytes:
                 f"{path} is a link that leads back to itself",
                 hint="remove the link, and name the file itself",
             )
+        if not path.exists() and path.name == "-":
+            raise DataError(
+                "standard input (-) cannot be read", hint="write it to a file first, and name that"
+            )
+        if not path.exists() and any(path.parent.glob(path.name)):
+            raise DataError(
+                f"{path} does not exist: it is a pattern in quotes",
+                hint="leave the quotes out, so that the shell fills in the names",
+            )
         if not path.exists():
             raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():
@@ -148,6 +157,14 @@ def is_sound(path: Path) -> bool:
         return False
 
 
+def cut_off(path: Path) -> str:
+    """Name what a recording left that was cut off before it had this name; empty where there is none."""
+    if path.suffix == ".partial" and path.with_suffix("").is_file():
+        return f"it was not cut off: {shlex.quote(str(path.with_suffix('')))} is whole"
+    left = path.with_name(f"{path.name}.partial")
+    return f"it was cut off: {shlex.quote(str(left))} holds what there is" if left.is_file() else ""
+
+
 def likely_kind(path: Path) -> str:
     """Return the kind of an artefact by its first bytes; empty where they tell of none."""
     try:
@@ -159,6 +176,22 @@ def likely_kind(path: Path) -> str:
         return "run"
     found = _FIRST_TEXT.search(start) if start.startswith(_HDF5) else None
     return found[1].decode() if found else ""
+
+
+def spaced(words: Sequence[str]) -> str:
+    """Return the file whose name has spaces in it and was typed without quotes, in quotes; else empty."""
+    runs = (" ".join(words[i:j]) for i in range(len(words)) for j in range(i + 2, len(words) + 1))
+    return next((shlex.quote(run) for run in runs if Path(run).is_file()), "")
+
+
+def columns_of(table: Path) -> tuple[str, ...]:
+    """Return the columns of a table that is to be imported; DataError where there is none to be read."""
+    check_file(table)
+    from pulsetrainer.files.array_files import reader_of  # noqa: PLC0415 - slow to import
+    from pulsetrainer.files.csv_dialect import detect  # noqa: PLC0415
+
+    reads = reader_of(table)
+    return tuple(reads(table).values) if reads else detect(table).names
 
 
 def check_resumable(path: Path) -> None:

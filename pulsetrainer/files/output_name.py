@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 from pulsetrainer.errors import EndingError
@@ -18,6 +19,12 @@ def is_no_file(path: Path) -> bool:
         return path.is_dir() or path.is_char_device()
     except OSError:
         return True
+
+
+def free(path: Path) -> Path:
+    """Return a path, or, where it is taken, a name like it that is not."""
+    others = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in itertools.count(2))
+    return next(other for other in itertools.chain((path,), others) if not other.exists())
 
 
 def check_artefact_name(path: Path, what: str, *, then: str = "") -> None:

@@ -216,7 +216,11 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     own = table.unit(column)
     if not own:
         return "1"
-    return check_unit(own, what, f"the heading {table.names[table.index(column)]!r} of {table.path}")
+    heading = table.names[table.index(column)]
+    if split_unit(heading)[1]:
+        return check_unit(own, what, f"the heading {heading!r} of {table.path}")
+    where = f"the line below the heading {heading!r} of {table.path}, which was taken for units,"
+    return check_unit(own, what, where, "keep one line of headings, or ")
 
 
 def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import difflib
 import io
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.artefacts import LARGEST, FloatArray, beyond_all_quantities
-from pulsetrainer.artefacts.units import counted, split_unit, symbol_of
+from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
@@ -32,6 +33,7 @@ from pulsetrainer.files.input_file import unreadable
 _WRITTEN_ROWS = 1 << 14
 _NAMED = 5  # bad rows
 _MOST_BAD = 0.99  # of the rows: with more of them bad, the table is not what it was taken for
+_WITH_UNIT = re.compile(r"[-+]?\d[\d.,]*\s*([^\d\s.,].*)")  # a cell
 _AGAIN = "export the recording again"
 
 
@@ -151,12 +153,19 @@ class Table:
         if k is None:
             raise self._no_column(name)
         if self.names[k] in self.text_names:
-            raise DataError(
-                f"{self.path} has text, not numbers, in {column_words(self.names[k])}, as in {self.place(0)}",
-                hint="name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
-                "01.05.2024 12:34:56",
-            )
+            raise self._of_text(k)
         return k
+
+    def _of_text(self, k: int) -> DataError:
+        """Return what is wrong with a column of text; it may be of numbers, each with its unit."""
+        cell = cell_at(self.path, self.line_of(0), k) if self.shifts else ""
+        hint = "name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
+        hint += "01.05.2024 12:34:56"
+        if (found := _WITH_UNIT.fullmatch(cell)) and is_unit(found[1]):
+            heading = f"{split_unit(self.names[k])[0]} [{found[1]}]"
+            hint = f"remove the unit from the cells, and write it in the heading: {heading!r}"
+        said = f"{self.path} has text, not numbers, in {column_words(self.names[k])}"
+        return DataError(f"{said}: {cell!r} in {self.place(0)}", hint=hint)
 
     def _no_column(self, name: str) -> DataError:
         """Return what is wrong with a name that no column has, or that several have."""

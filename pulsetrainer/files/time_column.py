@@ -24,6 +24,7 @@ ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the f
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
+_DATES = frozenset(["date", "datum", "fecha", "data", "datetime", "date time", "date/time"])
 _CLOCKS = frozenset(["utc", "gmt", "local", "epoch", "unix"])  # whose time it is, where its unit would stand
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
@@ -58,7 +59,7 @@ def time_of(
         place = own_column(table, {table.index(name) for name in wanted})
         if place is None:
             other = "other " * any(is_called_time(table.names[table.index(name)]) for name in wanted)
-            lack = f"{table.path} has no {other}time column"
+            lack = f"{table.path} has no {other}time column" + _unread(table)
             return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
@@ -82,6 +83,19 @@ def time_of(
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return Time(time_s, words, notes)
+
+
+def _unread(table: Table) -> str:
+    """Say that the column of the date is text: how no time is written that can be read."""
+    name = next((own for own in table.names if own in table.text_names and _tells_when(own)), None)
+    if name is None or not table.shifts:
+        return ""
+    cell = cell_at(table.path, table.line_of(0), table.names.index(name))
+    return f" (its {column_words(name)} could not be read as time: {cell!r})"
+
+
+def _tells_when(heading: str) -> bool:
+    return is_called_time(heading) or heading.lower() in _DATES
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
@@ -138,10 +152,13 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     """
     unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
+        below = not split_unit(table.names[table.index(name)])[1] and name in table.units
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
-            "or d",
-            hint="convert it to seconds" + ", choose another `time` column, or give a `rate_Hz`" * of_record,
+            "or d" + ": the line below the headings was taken for units" * below,
+            hint="keep one line of headings, or " * below
+            + "convert it to seconds"
+            + ", choose another `time` column, or give a `rate_Hz`" * of_record,
         )
     stamps = table.check_finite(name, remedy=LEAVE_OUT) if of_record else table.check_finite(name)
     time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]

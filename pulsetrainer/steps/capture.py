@@ -22,6 +22,7 @@ from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
     InMemory,
     Tally,
+    check_cooling,
     check_top,
     conditioning_loop,
     decimation_for,
@@ -166,6 +167,7 @@ def plan(
     played = recorded = 0
     for part in parts_of(course, at, ON_TIME_S - RAMP_S):
         reference = part.reference(course)
+        check_cooling(reference, signal)
         for piece in (loop, reference):
             if piece.size:
                 rehearsal.play(piece, signal.rate_Hz)

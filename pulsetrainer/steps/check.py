@@ -39,6 +39,10 @@ GAIN = 0.015
 TEMPERATURE_K = 5.0
 SHAPE_PERCENT = 0.2
 _SHAPE_OF_FIT = 2.0  # times what the model left of its own record, without noise
+AGAIN = (
+    "identify again: pulsetrainer capture identification -o new.h5, "
+    "then pulsetrainer identify new.h5 -o new-model.h5"
+)
 _LAG_S = 0.02  # lags of this and less are alike at the pace of a check
 _CREEPS_S = (0.3, 1.0, 3.0)
 
@@ -113,11 +117,11 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     >>> checked.error_percent.after <= checked.error_percent.before
     True
     """
-    check_units(model, "a check drives a current in A and measures")
+    check_units(model)
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
-    check_peak(np.asarray([low, high]), device.info.current_limit_A)
+    check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=AGAIN)
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)
@@ -173,7 +177,7 @@ def updated(model: Model, checked: Checked) -> Model:
         raise DataError(
             f"the shape of the hysteresis changed ({checked.shape_percent.value:.1f} % of the span is left): "
             "no offset or gain puts that right",
-            hint="identify again: pulsetrainer capture identification, then identify",
+            hint=AGAIN,
         )
     check_updatable(model)
     gain, rest = checked.gain.value, rest_force(model)

@@ -88,8 +88,10 @@ def compare(
     ]
     metrics = tuple(_metric(name, every, spreads, units) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
+        made = ["playback" if one.waveforms else "run" for one in tested]
+        of = ", ".join(f"{name} is of a {one}" for name, one in zip(titles, made, strict=False))
         raise DataError(
-            f"no two of {', '.join(titles)} have a figure in common",
+            f"no two of {', '.join(titles)} have a figure in common" + f": {of}" * (len({*made}) > 1),
             hint="evaluate the same pulses, with the same inversion, or the same models",
         )
     return metrics

@@ -337,7 +337,7 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
         raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
             hint=(f"did you mean {near[0]}? " if near else "")
-            + f"A name here is {' or '.join(stems)}, a point, and one of {', '.join(own)}",
+            + f"A name here is {' or '.join(stems)}, a dot, and one of {', '.join(own)}",
         )
     return tuple(
         Breach(name, value, low, high)

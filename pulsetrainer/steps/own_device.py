@@ -7,11 +7,12 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.errors import DataError
 
 
-def check_units(model: Model, does: str) -> None:
-    """Raise DataError for a model that is not from A to N; ``does`` says what needs it: "a check drives"."""
+def check_units(model: Model) -> None:
+    """Raise DataError for a model that is not from A to N."""
     if (model.input_unit, model.output_unit) != ("A", "N"):
         raise DataError(
-            f"the model is of a device from {model.input_unit} to {model.output_unit}; {does} a force in N",
+            f"the model takes {model.input_unit} and gives {model.output_unit}, so it is not a model of this "
+            "device (A and N)",
             hint="identify a run that was captured on the device",
         )
 

@@ -204,8 +204,8 @@ def check_drive(drive: Waveform) -> None:
     """Raise DataError where a drive is not of a current in A that is to give a force in N."""
     if (drive.input_unit, drive.output_unit) != ("A", "N"):
         raise DataError(
-            f"the drive {drive.name} is of a device from {drive.input_unit} to {drive.output_unit}; this one "
-            "takes a current in A and gives a force in N",
+            f"the drive takes {drive.input_unit} and gives {drive.output_unit}, so it is not a drive of this "
+            "device (A and N)",
             hint=f"identify and invert a run that was captured on the device; {_EXPORT}",
         )
 

@@ -30,7 +30,7 @@ def check_rate(rate: float | None) -> None:
     """Raise UsageError for a rate outside 20 to 240 beats a minute."""
     if rate is not None and not SLOWEST_BPM <= rate <= FASTEST_BPM:
         raise UsageError(
-            f"a rate of {rate:g} beats a minute is outside {SLOWEST_BPM:g} to {FASTEST_BPM:g}",
+            f"`rate` must be {SLOWEST_BPM:g} to {FASTEST_BPM:g} beats a minute, got {rate:g}",
             hint="a usual rate is 75",
         )
 

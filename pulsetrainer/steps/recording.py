@@ -191,7 +191,7 @@ def record(
     windows, begun_cold = Windows(), at == 0
     parts, step = 0, info.tick_rate_Hz
     for part in parts_of(course, at, device.longest_play_s):
-        check_ever_cool(part.reference(course), rate_Hz)  # before the loop, which would be for nothing
+        check_cooling(part.reference(course), course.signal)  # before the loop, which would be for nothing
         if condition_first:
             _LOG.info("conditioning: once around the major loop")
             condition(device, high, rate_Hz)
@@ -266,6 +266,15 @@ def check_top(signal: excitations.Signal, limit_A: float) -> None:
         f"give `current_max_A` at most {limit_A:g}" if ours else f"scale the table to at most {limit_A:g} A"
     )
     check_peak(signal.value, limit_A, hint=lower)
+
+
+def check_cooling(reference_A: FloatArray, signal: excitations.Signal) -> None:
+    """Raise ArgumentError for a piece (n,) in A of a recording that even a cold coil does not bear."""
+    hint = f"play less of {signal.name} at a time, or at a lower current"
+    if signal.name in EXCITATIONS:
+        hint = "give fewer `levels` or `repeats`, or a lower `current_max_A`; with few levels a higher "
+        hint += "`speed_A_per_s` helps too"
+    check_ever_cool(reference_A, signal.rate_Hz, hint)
 
 
 def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:

@@ -52,7 +52,7 @@ class InMemory:
 
 def check_model(model: Model) -> None:
     """Raise DataError for a model of another device or another form, or whose weights are read as relays."""
-    check_units(model, "a session drives a current in A and presses")
+    check_units(model)
     if model.form != "direct":
         raise DataError(
             f"the model has the form {model.form}; a session carries the memory of direct models only",

@@ -117,7 +117,7 @@ def test_quick_says_that_it_is_quick(bench):
     assert done.json["next_commands"] == [full]
     done = pulsetrainer(bench, "extend", "quick.h5", "--model", "model.h5", "-o", "no.h5")
     assert done.code == 3
-    assert "without --quick" in done.err
+    assert "without --quick: pulsetrainer diagnose diagnostic.h5 --model model.h5" in done.err
 
 
 @pytest.mark.slow

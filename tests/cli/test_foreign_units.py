@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from program import pulsetrainer
+from wording import refusal
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 EXACT = 1e-3  # % of the largest output: what rounding leaves of an exact inverse
@@ -85,3 +86,10 @@ def test_a_limit_that_is_too_slow_is_named_with_its_unit(tmp_path):
     assert done.code == 0, done
     assert done.json["predicted_max_error_percent"] > WORTH_A_WARNING
     assert "1000 mV/s" in done.err
+
+
+def test_a_model_of_another_kind_of_device_is_named(tmp_path):
+    """It can neither be checked nor played in a session."""
+    test_a_model_in_other_units_is_inverted(tmp_path, "piezo")
+    for words in (("check", "model.h5"), ("session", "--model", "model.h5", "-o", "session.h5")):
+        refusal(pulsetrainer(tmp_path, *words), 3, "another kind of device", file="model.h5")

@@ -10,7 +10,7 @@ import pytest
 from program import pulsetrainer
 from pulsetrainer.artefacts import Run
 from pulsetrainer.files import store
-from wording import refusal
+from wording import refusal, tells
 
 TRIANGLE = np.abs((np.arange(300) % 100) - 50.0)
 COLUMNS = ("--input", "u", "--output", "y")
@@ -227,3 +227,12 @@ def test_a_record_of_a_circuit_simulator_is_in_volts_and_amperes(tmp_path):
     assert pulsetrainer(tmp_path, "import", "a.csv", *words, "-o", "a.h5").code == 0
     run = store.read(tmp_path / "a.h5", Run)
     assert (run.input_unit, run.output_unit, run.output_quantity) == ("V", "A", "I(L1)")
+
+
+def test_a_date_that_cannot_be_read_is_shown(tmp_path):
+    """The table has a time, which only a person can read."""
+    rows = [f"{k + 1} Nov 2026,{u},{u}" for k, u in enumerate(TRIANGLE[:20])]
+    (tmp_path / "a.csv").write_text("\n".join(["date,u,y", *rows, ""]))
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    assert done.code == 0, done
+    tells(done.err, "no time that can be read")

@@ -59,7 +59,7 @@ def test_a_drive_of_another_device_is_not_played(units):
     """Nor refined: 9 mT were pressed as 9 N."""
     drive = replace(examples.waveform(400), input_unit=units[0], output_unit=units[1])
     for verb in (partial(plan, repeats=1), check_drive):
-        with pytest.raises(DataError, match=f"from {units[0]} to {units[1]}"):
+        with pytest.raises(DataError, match=f"takes {units[0]} and gives {units[1]}"):
             verb(drive)
 
 

@@ -355,6 +355,17 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
         check_output(tmp_path / "a.h5")
 
 
+def test_an_output_that_is_write_protected_stays(tmp_path, monkeypatch):
+    """Somebody protected it: ``--overwrite`` is no leave to replace it."""
+    kept = tmp_path / "kept.h5"
+    kept.write_bytes(b"mine")
+    kept.chmod(0o444)
+    monkeypatch.setattr(os, "access", lambda path, _: path != kept)  # root may write anywhere
+    with raises(DataError, "write-protected", file=kept), atomic_write.replacing(kept, overwrite=True):
+        pass
+    assert kept.read_bytes() == b"mine"
+
+
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc, where not even root makes files")
 def test_a_folder_where_nobody_makes_files(tmp_path):
     """Its permissions allow it, or root may do anything: told before the work, not after it."""

@@ -591,7 +591,7 @@ def test_columns_of_text_are_passed_over(table):
     read = table("when,u,y\nnoon,1,2\nlater,,4\n")
     np.testing.assert_array_equal(read.column("y"), [2, 4])
     np.testing.assert_array_equal(read.column("u"), [1, np.nan])
-    with raises(DataError, "column of text", place="column when, as in line 2"):
+    with raises(DataError, "column of text", place="column when: 'noon' in line 2"):
         read.column("when")
 
 
