@@ -14,6 +14,7 @@ from pulsetrainer.cli import guard, settings
 from pulsetrainer.cli.help_text import Program
 from pulsetrainer.cli.naming import Command
 from pulsetrainer.files import settings as setting_files
+from pulsetrainer.report.spelling import speak_any_encoding
 from pulsetrainer.version import __version__
 
 # Plain help: drawing it with rich would cost a third of the time until it shows.
@@ -75,6 +76,6 @@ def main() -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown: no display, no toolkit is needed
     guard.end_like_ctrl_c()
-    guard.speak_any_encoding()
+    speak_any_encoding()
     guard.hush_libraries(sys.argv)
     sys.exit(guard.funnel(app, sys.argv[1:]))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import codecs
 import contextlib
 import errno
-import io
 import json
 import logging
 import os
@@ -22,7 +20,6 @@ from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import check_apart, usage_of
 from pulsetrainer.errors import TRY, DataError, Interrupted, PulsetrainerError, UsageError
-from pulsetrainer.report.spelling import in_letters
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _READER_GONE = 141  # as a shell tells SIGPIPE
@@ -103,16 +100,6 @@ def end_like_ctrl_c() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # not under nohup
             signal.signal(number, interrupt)
-
-
-def speak_any_encoding() -> None:
-    """Let a terminal or pipe without Unicode show what it cannot spell in letters, instead of failing."""
-    codecs.register_error("in letters", in_letters)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            spelled = stream.encoding.lower().replace("-", "") == "utf8" and stream.errors != "strict"
-            if not spelled:
-                stream.reconfigure(errors="in letters")
 
 
 def _be_verbose() -> None:

@@ -125,12 +125,9 @@ class Job:
 
     def alike(self, files: Sequence[Path]) -> None:
         """Say which files are the same, byte for byte: between them nothing can differ."""
-        from pulsetrainer.files.provenance import sha256_of
+        from pulsetrainer.files.provenance import same_files
 
-        same: dict[str, list[str]] = {}
-        for path in files:
-            same.setdefault(sha256_of(path), []).append(str(path))
-        twice = [" and ".join(names) for names in same.values() if len(names) > 1]
+        twice = map(" and ".join, same_files(files))
         self.notes([f"{names} are the same file, so nothing differs between them" for names in twice])
 
     def check_device(self) -> None:

@@ -7,7 +7,6 @@ import difflib
 import re
 import shlex
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +101,7 @@ class Command(TyperCommand):
             raise
 
 
-def _with_file(said: str, given: Mapping[str, Any]) -> str:
+def _with_file(said: str, given: Any) -> str:
     """Return a message with the file of the model, the drive or the bounds that it begins with."""
     found = re.match(r"the (model|drive|bounds) (?=takes |is of |name )", said)
     file = given.get(found[1]) if found else None

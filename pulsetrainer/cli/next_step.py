@@ -121,15 +121,13 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
     return text
 
 
-def the_other_way(
-    problem: errors.PulsetrainerError, parameters: Mapping[str, Any], words: Sequence[str]
-) -> str:
+def the_other_way(problem: errors.PulsetrainerError, given: Mapping[str, Any], words: Sequence[str]) -> str:
     """Return words with two files exchanged, where each is what the other should be; else empty."""
     if not isinstance(problem, errors.WrongKindError):
         return ""
     for name, kinds in HOLDS.items():
-        given = parameters.get(name)
-        other = Path(given) if isinstance(given, str | Path) else Path()
+        file = given.get(name)
+        other = Path(file) if isinstance(file, str | Path) else Path()
         if problem.found in kinds and likely_kind(other) in problem.expected:
             there = {problem.path: other, other: problem.path}
             return shlex.join(str(there.get(Path(word), word)) for word in words)

@@ -45,7 +45,7 @@ _NO_OPTION = {
     "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
     "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
-_LONG_DASHES = "\N{EN DASH}\N{EM DASH}\N{MINUS SIGN}"
+_LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 
@@ -95,8 +95,8 @@ def check_apart(words: Sequence[str]) -> None:
                 f"there is no option {word}: give the file to write after -o and a space",
                 hint=f"-o {name}" + f"; for a column, two dashes: --output {name}" * ("import" in words),
             )
-        if word.startswith(tuple(_LONG_DASHES)) and not Path(word).exists():
-            short = word.lstrip(_LONG_DASHES)
+        if word.startswith(_LONG_DASHES) and not Path(word).exists():
+            short = word.lstrip("".join(_LONG_DASHES))
             dash = "-" if len(short) == 1 or short[:1].isdigit() else "--"
             raise UsageError(
                 f"{word} begins with a long dash, as a word processor makes it, and is no option",

@@ -197,3 +197,11 @@ def sha256_of(path: Path | str) -> str:
 def digests(paths: Iterable[Path | str]) -> dict[str, str]:
     """Return the sha256 of each file under the name the user gave it; raises as ``sha256_of``."""
     return {str(path): sha256_of(path) for path in paths}
+
+
+def same_files(paths: Iterable[Path | str]) -> list[list[str]]:
+    """Return the names of files that are the same, byte for byte; raises as ``sha256_of``."""
+    same: dict[str, list[str]] = {}
+    for path in paths:
+        same.setdefault(sha256_of(path), []).append(str(path))
+    return [names for names in same.values() if len(names) > 1]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import re
+import sys
 
 # as the importer reads units
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
@@ -11,7 +14,7 @@ _IN_LETTERS = str.maketrans(
 )
 
 
-def in_letters(error: UnicodeError) -> tuple[str | bytes, int]:
+def _in_letters(error: UnicodeError) -> tuple[str | bytes, int]:
     """Spell what an encoding lacks: ``N^2`` for N², an escape where there is no spelling."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
@@ -20,3 +23,13 @@ def in_letters(error: UnicodeError) -> tuple[str | bytes, int]:
         "[⁰¹²³⁴-⁹⁻⁺]+", lambda power: "^" + power[0].translate(_RAISED), lacking.translate(_IN_LETTERS)
     )
     return spelled.encode("ascii", "backslashreplace").decode("ascii"), error.end
+
+
+def speak_any_encoding() -> None:
+    """Let a terminal or pipe without Unicode show what it cannot spell in letters, instead of failing."""
+    codecs.register_error("in letters", _in_letters)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            spelled = stream.encoding.lower().replace("-", "") == "utf8" and stream.errors != "strict"
+            if not spelled:
+                stream.reconfigure(errors="in letters")
