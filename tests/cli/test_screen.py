@@ -238,7 +238,8 @@ def test_a_name_that_the_terminal_cannot_spell_is_no_error(tmp_path, encoding):
 def test_what_a_terminal_cannot_spell_is_written_in_letters(tmp_path):
     """A square as the importer reads it, anything else as an escape."""
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
-    job = "from pulsetrainer.report.spelling import speak_any_encoding as speak; speak(); print('N/A², 5 µs, 1 kΩ, 10⁻³, 脈')"
+    job = "from pulsetrainer.report import spelling; spelling.speak_any_encoding(); "
+    job += "print('N/A², 5 µs, 1 kΩ, 10⁻³, 脈')"
     done = subprocess.run([sys.executable, "-c", job], env=environment, capture_output=True, check=True)
     assert done.stdout.split(b"\n")[0].strip() == rb"N/A^2, 5 us, 1 kOhm, 10^-3, \u8108"
 
