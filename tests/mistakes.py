@@ -562,7 +562,11 @@ INSIDE = {
     ),
     "a limit of a check": Mistake(
         ("check", "model.h5", "--limit-current", "0.005"),
-        *(3, "the limit in force is 0.005 A", "give --limit-current 1.5, or leave it out; or identify again"),
+        *(
+            3,
+            "the limit in force is 0.005 A",
+            "--limit-current to 1.5 or leave it out, where it was",
+        ),
     ),
     "a drive as a run": Mistake(
         ("identify", "drive.h5", "-o", "out.h5"), 3, "got a drive", "run files beside it: run.h5"
@@ -686,7 +690,7 @@ INSIDE = {
         ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
         *(
             3,
-            "at 1e+09 A/s (--speed) the signal would move by 1e+06 A between two samples",
+            "move by 1e+06 A, more than its whole range of 1.5 A, at 1e+09 A/s (--speed)",
             "a lower --speed (0.75 is usual), or a higher --rate",
         ),
     ),

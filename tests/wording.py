@@ -61,7 +61,7 @@ MESSAGES = {
     "no sound provenance": Message("the provenance is not", "", "{file}"),
     "no provenance": Message("'provenance' is missing", "", "{file}"),
     "not writable": Message("not writable", "", "{folder}"),
-    "write-protected": Message("is write-protected", "chmod u+w {file}", "{file}"),
+    "write-protected": Message("is write-protected", "chmod u+rw {file}", "{file}"),
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "name one of these", "{file}", "force_N", "t_s, current_A"),
@@ -111,7 +111,7 @@ MESSAGES = {
     ),
     "recorded with other options": Message("other options", "the same options", "a.h5"),
     "not such an argument": Message("{argument} must", "", got="{got}"),
-    "too few samples": Message("between two samples", "a lower `speed_A_per_s`", got="{got}"),
+    "too few samples": Message("between two samples", "a higher `rate_Hz`", got="{got}"),
     "method too large": Message("dense", "", got="{method}"),
     "plane too large": Message("dense", ""),
     "too few blocks": Message("at least 2 blocks", "a shorter block"),

@@ -94,20 +94,22 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
     step from one sample to the next that is wider than the range.
     """
     edges = Plane.uniform(low, high, n_h).edges
-    _check_step(speed, rate_Hz, high - low)
+    step = speed / rate_Hz if rate_Hz > 0 else 0.0
+    slower = f"a lower `speed_A_per_s` ({_USUAL_SPEED:g} is usual), or "
+    _check_step(step, high - low, slower, f", at {speed:g} A/s (`speed_A_per_s`)")
     bottoms = edges[-2::-1]
     turns = np.empty(2 * n_h + 1)
     turns[0], turns[1::2], turns[2::2] = low, high, bottoms
     return Signal(through(turns, speed, rate_Hz), rate_Hz, "identification")
 
 
-def _check_step(speed: float, rate_Hz: float, reach: float) -> None:
+def _check_step(step: float, reach: float, slower: str, said: str = "") -> None:
     """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
-    if rate_Hz > 0 and speed / rate_Hz > reach:
+    if step > reach:
         raise ArgumentError(
-            f"at {speed:g} A/s (`speed_A_per_s`) the signal would move by {speed / rate_Hz:.3g} A between "
-            f"two samples, more than its whole range of {reach:.3g} A",
-            hint=f"give a lower `speed_A_per_s` ({_USUAL_SPEED:g} is usual), or a higher `rate_Hz`",
+            f"between two samples the signal would move by {step:.3g} A, more than its whole range of "
+            f"{reach:.3g} A{said}",
+            hint=f"give {slower}a higher `rate_Hz`",
         )
 
 
@@ -165,7 +167,7 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     """
     ascending(low, high)
     positive(rate=rate_Hz)
-    _check_step(max(_RATES) * (high - low), rate_Hz, high - low)
+    _check_step(max(_RATES) / rate_Hz * (high - low), high - low, "")
     parts: list[FloatArray] = []
 
     def go(points: tuple[float, ...], ranges_per_s: float) -> None:

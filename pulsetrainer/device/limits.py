@@ -122,7 +122,7 @@ def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str = "") -> No
     hint = hint or less_current(f"`current_max_A` at most {limit_A:g}")
     peak = float(np.max(reference_A, initial=0.0))
     if limit_A < CURRENT_A and peak <= CURRENT_A + codes.CURRENT_UNIT_A / 2:
-        hint = f"where it was lowered, give `limit_current_A` {peak:.4g}, or leave it out; or {hint}"
+        hint = f"raise `limit_current_A` to {peak:.4g} or leave it out, where it was lowered; or {hint}"
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(
             f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint

@@ -63,7 +63,7 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
     if path.exists() and not os.access(path, os.W_OK):
         raise DataError(
             f"the output {path} is write-protected",
-            hint=f"name another file, or allow it: chmod u+w {shlex.quote(str(path))}",
+            hint=f"name another file, or allow it: chmod u+rw {shlex.quote(str(path))}",
         )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(

@@ -346,7 +346,11 @@ def test_what_was_measured_is_never_the_output(ready, words):
     ("words", "code", "hint"),
     [
         (["identify", "run.h5", "-o", "run.h5"], 2, "name another file"),
-        (["capture", "identification", "--speed", "1e6", *OUT], 3, "a lower --speed, or a higher --rate"),
+        (
+            ["capture", "identification", "--speed", "1e6", *OUT],
+            3,
+            "a lower --speed (0.75 is usual)",
+        ),
         (["capture", "identification", "--port", "socket://localhost", *OUT], 4, "socket://localhost:5000"),
         (["invert", "normal", "-m", "model.h5", *OUT], 2, "--model"),
         (["session", "--model", "model.h5", "--pulses", "normal", "bifid", *OUT], 2, "--pulses normal,bifid"),

@@ -68,7 +68,8 @@ LOCKED = {
         "permission to read locked.toml",
         "chmod u+rX locked.toml",
     ),
-    "tune -o locked.toml": (2, "permission to read locked.toml", "chmod u+rX locked.toml"),
+    "tune -o locked.toml": (3, "locked.toml is write-protected", "chmod u+rw locked.toml"),
+    "identify run.h5 -o locked.h5 --overwrite": (3, "locked.h5 is write-protected", "chmod u+rw locked.h5"),
     "identify run.h5 -o closed/m.h5": (2, "no permission for the folder closed", "in another place"),
     "plot run.h5 -o closed/run.png": (2, "no permission for the folder closed", "in another place"),
 }
