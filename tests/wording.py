@@ -117,6 +117,7 @@ MESSAGES = {
     "did not settle": Message("did not settle", "", expected="within {steps}"),
     "no beat of that number": Message("no beat", "from 1 to {count}", got="{count} whole beats"),
     "no whole beat": Message("no whole beat", ""),
+    "a unit like it": Message("{wrong}", "mean '{unit}'", "{argument}"),
     "no such unit": Message("{argument}", "{argument}", "{place}"),
     "provenance itself": Message("provenance", ""),
     "no time zone": Message("time zone", "datetime.now"),
