@@ -287,6 +287,11 @@ def with_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s"
 
 
+def unit_of_axis(seconds: float) -> tuple[str, float]:
+    """Return the unit in which an axis of a time so long is easily read, s or more, and its length in s."""
+    return next((unit, one) for unit, one, least in _EASY if seconds >= least or unit == "s")
+
+
 def units_of(measured: Run | Model) -> str:
     """Return the units of an input and an output in words: ``A and N``; ``no units`` where there are none."""
     units = [shown(unit) for unit in (measured.input_unit, measured.output_unit)]
