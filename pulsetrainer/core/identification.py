@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isqrt
 from typing import Literal
 
 import numpy as np
@@ -111,7 +112,7 @@ def identify(
 ) -> Identified:
     """Fit weights mu >= 0 and a free offset to one or several records.
 
-    Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 82 levels) are solved by
+    Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 83 levels) are solved by
     ``large.solve``, which needs none.
 
     All ``records`` share one set of weights and one offset; inputs outside the range of the ``plane`` are
@@ -155,12 +156,18 @@ def _signed(
     samples: int,
 ) -> Identified:
     """Fit weights of either sign."""
-    if reading != "continuous" or method != "joint" or not fits_dense(plane):
-        most_dense = int(np.sqrt(2.0 * np.sqrt(DENSE_BYTES / (8 * _DENSE_COPIES))))
+    if reading != "continuous" or method != "joint":
         raise ArgumentError(
-            f"signed weights are fitted jointly, in the continuous reading, on planes of at most "
-            f"{most_dense} levels, got {method}, {reading} and {plane.n_h}",
-            hint="leave method and reading out, and use fewer levels",
+            f"signed weights are fitted jointly, in the continuous reading, got {method} and {reading}",
+            hint="leave method and reading out",
+        )
+    if not fits_dense(plane):
+        cells = isqrt(DENSE_BYTES // (8 * _DENSE_COPIES))
+        most = (isqrt(8 * cells + 1) - 1) // 2  # n (n + 1) / 2 <= cells
+        raise ArgumentError(
+            f"weights of either sign, which this record is fitted with, have at most {most} levels, got "
+            f"{plane.n_h}: more take over {DENSE_BYTES / 1e9:.0f} GB",
+            hint=f"give `levels` {most} or less, or `form` direct",
         )
     upright, zero = levelled(records)
     choice = choose(upright, plane, reading, signed=True) if smoothing == "auto" else Choice(smoothing, ())

@@ -58,8 +58,8 @@ def course(found: Diagnosis) -> Figure:
         _drawn(below, found, found.output - found.after, **MODEL, label="with them")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
-    name = "sample number" if _timeless(found) else label("time", "s")
-    below.set_xlabel(name if len(found.records) == 1 else f"{name}, recordings one after another")
+    several = "" if len(found.records) == 1 else ", recordings one after another"
+    panels.name_abscissa(below, panels.SAMPLE_NUMBER if _timeless(found) else "time", several)
     panels.headroom(below)
     return figure
 
