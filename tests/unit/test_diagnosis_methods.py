@@ -1019,7 +1019,7 @@ def test_what_can_be_done_now_comes_before_what_to_record(kind):
     bench = advised.Bench(Scale(), "A")
     now = advised.advice(Evidence(kind, names=("creep",)), bench)
     both = advised.advice(Evidence(kind, names=("creep", "holds")), bench)
-    assert both.startswith(f"{now} This recording cannot show everything (the input never rests")
+    assert both.startswith(f"{now}\nThis recording cannot show everything (the input never rests")
     assert "record output and input again" in both
 
 
@@ -1220,7 +1220,7 @@ def test_advice_to_record_again_says_how():
     """By us: the whole command, up to where the input went; elsewhere: the columns of the table."""
     lacks = Evidence("lacks", names=("holds",))
     ours = advised.advice(lacks, advised.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
-    assert ours.endswith("pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5.")
+    assert "pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5. Then diagnose" in ours
     bench = advised.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
     assert (
         "the columns time in s, H in A/m and strain, and read that with pulsetrainer import"
