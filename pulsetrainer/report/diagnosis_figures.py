@@ -110,6 +110,8 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     axes.set(xlabel=_folded(axis_of(one, input_quantity)), ylabel=label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
+    if one.name == "time":
+        panels.name_abscissa(axes)
     return figure
 
 
@@ -140,6 +142,7 @@ def axis_of(one: Profile, input_quantity: str = "") -> str:
         "direction": f"direction of the {name}",
         "level": label(name, one.unit),
         "frequency": label("frequency of the error", one.unit),
+        "time": "time",  # its unit is that of the axis
     }
     return known.get(one.name, label(one.name, one.unit))
 
