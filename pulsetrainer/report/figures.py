@@ -83,7 +83,7 @@ def run(record: Run) -> Figure:
     output_label = label(record.output_quantity, record.output_unit)
     above.set_ylabel(input_label)
     title = f"{record.signal} signal over time" if record.signal else "record over time"
-    title = f"{record.signal} over time" if "." in record.signal else title[:1].upper() + title[1:]  # of a file
+    title = f"{record.signal} over time" if "." in record.signal else title[:1].upper() + title[1:]  # a file
     above.set_title(title + ("" if record.complete else ", incomplete"))
     if record.reference is not None:
         panels.headroom(above)
