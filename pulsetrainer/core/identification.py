@@ -33,6 +33,7 @@ Smoothing = float | Literal["auto"]
 # The dense path holds about ten matrices of n_q^2 numbers at its peak; above this it goes matrix-free.
 DENSE_BYTES = 1_000_000_000
 _DENSE_COPIES = 10
+_MOST_ALTERNATIONS = 200
 # A correlation of input and output above this tells by itself whether the loop rises or falls.
 CLEAR = 0.5
 _SIGN_LEVELS = 24
@@ -298,9 +299,7 @@ def _fit_large(
     return large.solve(node_sums(plane, records, reading), smoothing)
 
 
-def _alternate(
-    equations: NormalEquations, gram: FloatArray, limit: int = 200
-) -> tuple[FloatArray, float, int]:
+def _alternate(equations: NormalEquations, gram: FloatArray) -> tuple[FloatArray, float, int]:
     """Alternate between the offset and the weights until neither moves (Carneiro et al. 2018, section 3).
 
     The plain alternation creeps: ten thousand rounds at 48 levels. Its moves are a piecewise linear
@@ -310,7 +309,7 @@ def _alternate(
     spread = np.sqrt(max(equations.output_square / equations.weight_sum - offset**2, 0.0))
     passive: BoolArray | None = None
     before: tuple[float, float] | None = None
-    for iteration in range(1, limit + 1):
+    for iteration in range(1, _MOST_ALTERNATIONS + 1):
         found = nnls.solve(gram, equations.moment - offset * equations.row_sum, passive=passive)
         passive = found.passive
         moved = equations.offset(found.x) - offset
@@ -322,5 +321,5 @@ def _alternate(
         before = (offset, moved)
         offset += change
     raise ConvergenceError(
-        f"offset and weights still moved after {limit} alternations", hint="use the joint method"
+        f"offset and weights still moved after {_MOST_ALTERNATIONS} alternations", hint="use the joint method"
     )
