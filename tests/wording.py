@@ -113,11 +113,15 @@ MESSAGES = {
     "not such an argument": Message("{argument} must", "", got="{got}"),
     "too few samples": Message("between two samples", "a higher `rate_Hz`", got="{got}"),
     "method too large": Message("dense", "", got="{method}"),
+    "too many levels of either sign": Message(
+        "either sign", "`levels` {most} or less", expected="at most {most}", got="got {levels}"
+    ),
     "plane too large": Message("dense", ""),
     "too few blocks": Message("at least 2 blocks", "a shorter block"),
     "did not settle": Message("did not settle", "", expected="within {steps}"),
     "no beat of that number": Message("no beat", "from 1 to {count}", got="{count} whole beats"),
     "no whole beat": Message("no whole beat", ""),
+    "a unit like it": Message("{wrong}", "mean '{unit}'", "{argument}"),
     "no such unit": Message("is not a known unit", "{argument}", "{place}"),
     "provenance itself": Message("provenance", ""),
     "no time zone": Message("time zone", "datetime.now"),

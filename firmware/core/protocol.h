@@ -1,5 +1,5 @@
 /* Ids, payload layouts and limits of the wire protocol.
- * Made from pulsetrainer/device/messages.py by `make -C firmware header`; a test keeps the two equal. */
+ * Made from pulsetrainer/device/codes.py and messages.py by `make -C firmware header` (tested). */
 #ifndef PULSETRAINER_PROTOCOL_H
 #define PULSETRAINER_PROTOCOL_H
 

@@ -130,6 +130,11 @@ class Diagnosis(Shown):
         return tuple(one for one in self.causes if one.found)
 
     @property
+    def advice(self) -> list[str]:
+        """Paragraphs of ``next_experiment``: what to do, and what to record if more should be seen."""
+        return self.next_experiment.split("\n")
+
+    @property
     def next_command(self) -> str:
         """What to do about it: "correct" the run, "extend" the model, or empty where neither helps."""
         if self.correctable and (self.verdict in self.correctable or self.extended is None):

@@ -24,6 +24,7 @@ _PREFIXED_SYMBOLS = """
 """
 _BARE_SYMBOLS = """
     1 % ‰ percent permille ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev
+    U/min
     atm counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
 """
 # what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
@@ -33,10 +34,11 @@ _SUFFIXES = """
     GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm
     deg rad C °C degC K Hz kHz W g kg % percent permille Ah mAh Wh mWh kWh
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
+    l/h l/min l/s L/h L/min L/s ml/min m3/h m3/s U/min
 """
 _PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
-_USUAL_FIRST = (*_SUFFIXES.split(), *_PREFIXED_SYMBOLS.split(), *_BARE_SYMBOLS.split())
 _BEHIND_A_NAME = frozenset(_SUFFIXES.split())
+_OFFERED = _PREFIXED | _BARE | {unit for unit in _BEHIND_A_NAME if "/" not in unit}
 # as oscilloscopes and people spell them
 _SPELLED = {
     word: unit
@@ -63,6 +65,9 @@ _SPELLED |= {
     for long, short in _SPELLED.items()
     if short in _PREFIXED
 }
+_SPELLED |= dict.fromkeys("-–—\N{MINUS SIGN}", "1")  # "none"
+# how a quantity is measured, behind its unit: none changes the numbers of a record
+_MANNER = re.compile(r"(?:[\s(]+(?:abs|rel|gauge|rms|eff|pp|pk|peak|ac|dc)\.?|rms|pp)\)?$", re.IGNORECASE)
 _NO_UNIT_ALONE = frozenset(["min", "second"])  # the least, the next one
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0, "ns": 1e-9}
 SECONDS |= dict.fromkeys(["us", "µs", "μs"], 1e-6)
@@ -75,7 +80,14 @@ _BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|\((?
 # as circuit simulators write a voltage of a node or between two, and a current of an element or its pin
 _OF_A_PART = re.compile(r"(?P<what>[Vv]|i|I[bcdegsx]?)\((?!t\))(?P<part>[\w:.,]+)\)")
 _NO_PART = 4  # letters of a unit: ``counts`` is hardly the name of a node, ``in`` and ``g`` are
+# a quantity's symbol that looks like a unit, over a unit of that quantity (``Weg s/mm``), and words and
+# numbers of channels: there the slash does not stand within a unit
+_OF_A_SYMBOL = re.compile(
+    r"d?[dhls]/.?m$|d?F/.?N$|d?T\w?/(?:K|°?C|degC)$|H/(?!m$)|m\d?/.?g$|d?V/(?:.?[lL]|.?m\^?[3³])$|L/.?H$|C/.?F$"
+    r"|W/.?J$|P\w?/.?W$|M\w?/.?Nm$|p\w?/(?:.?Pa|m?bar)$|min/|in/(?!s$|min$)|1/(?!s$|min$|h$)"
+)
 _MARK = re.compile(r"\s*[/,]\s*|\s+in\s+|\s+(?=[%‰°]\w?$)")
+_WORD_BEHIND = re.compile(r"^(?P<name>.*\S)(?<! per)\s+(?P<unit>\S{2,})$")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
 # as a name without a slash says it, such as one of MATLAB: H_kA_m; V_s and the like may be a product
 _COMPOUND = re.compile(r"^(?P<name>.+?)_(?P<top>[^_\s]+)_(?P<per>per_)?(?P<bottom>[^_\s]+)$")
@@ -111,10 +123,10 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
-    capitals = (unit for unit in _USUAL_FIRST if unit.lower() == text.lower())  # or their lack
-    meant = _SPELLED.get(text.lower()) or next(capitals, "")
-    likely = [] if where else difflib.get_close_matches(text, _USUAL_FIRST, n=2, cutoff=0.5)
-    near = [meant] if meant else list(dict.fromkeys(likely))  # a heading may have any word there
+    known = [one for one in (symbol_of(text), *text.split()[:1]) if is_unit(one)]  # not bar for mbar
+    known += [unit for unit in (*_SUFFIXES.split(), *_OFFERED) if unit.lower() == text.lower()]
+    # a heading may have any word there
+    near = known[:1] or ([] if where else difflib.get_close_matches(text, _OFFERED, n=2, cutoff=0.5))
     raise DataError(
         f"{text!r} in {where} is not a known unit" if where else f"{what} {text!r} is not a known unit",
         hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
@@ -138,15 +150,22 @@ def quantity_in_words(quantity: str) -> str:
 
 
 def symbol_of(text: str) -> str:
-    """Return the symbol of a unit that is spelled out, any other text as it is."""
-    return _SPELLED.get(text.lower(), text)
+    """Return the symbol of a unit that is spelled out or says how it is measured, any other text as it is.
+
+    ``volts`` is V, ``mbar abs`` mbar; a dash is 1, no unit.
+    """
+    bare = _MANNER.sub("", text)
+    symbol = _SPELLED.get(bare.lower(), bare)
+    return symbol if is_unit(symbol) else text
 
 
 def split_unit(heading: str) -> tuple[str, str]:
     """Return name and unit of a column heading; no unit where it says none.
 
     What stands in brackets at its end is a unit, known or not. Behind a slash, a comma or the word "in" it
-    is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names. ``V(in)`` is a voltage of a node.
+    is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names. Behind a blank it is a quotient of
+    known units (``Flow l/h``, but ``Weg s/mm`` is a quantity by its unit) or a unit of several letters.
+    ``V(in)`` is a voltage of a node.
     """
     if unit := _unit_of_a_part(heading):
         return heading, unit
@@ -156,11 +175,31 @@ def split_unit(heading: str) -> tuple[str, str]:
         return parted
     if len(heading) > 1 and heading.lower() not in _NO_UNIT_ALONE and _stands_alone(heading):
         return heading, heading
+    return _behind_a_mark(heading) or (heading, "")
+
+
+def _behind_a_mark(heading: str) -> tuple[str, str] | None:
+    """Return name and unit where a slash, a comma, "in" or a blank stands before a known unit."""
     for mark in _MARK.finditer(heading):
         name, unit = heading[: mark.start()], heading[mark.end() :].strip()
         if name and name[-1] not in "/," and unit != "1" and is_unit(symbol_of(unit)):
-            return name, unit
-    return heading, ""
+            return _quotient(name, mark.group(), unit) or (name, unit)
+    found = _WORD_BEHIND.match(heading)
+    known = found and found["unit"] in _BEHIND_A_NAME - _NO_UNIT_ALONE
+    return (found["name"], found["unit"]) if found and known else None
+
+
+def _quotient(name: str, mark: str, below: str) -> tuple[str, str] | None:
+    """Return name and unit where a slash stands within the unit: its top is the last word of the name.
+
+    With blanks around the slash a single letter is a symbol: ``Kraft F / N``.
+    """
+    quantity, _, top = name.rpartition(" ")
+    unit = top + mark + symbol_of(below)
+    within = mark == "/" or (mark.strip() == "/" and len(top) > 1)
+    if not quantity or not within or not is_unit(unit) or _OF_A_SYMBOL.match(f"{top}/{below}"):
+        return None
+    return quantity.rstrip(" :="), unit
 
 
 def _suffixed(heading: str) -> tuple[str, str] | None:
@@ -193,7 +232,7 @@ def _unit_of_a_part(heading: str) -> str:
 
 
 def _stands_alone(text: str) -> bool:
-    return text in _BEHIND_A_NAME or (len(text) > 3 and symbol_of(text) in (*_BEHIND_A_NAME, "d"))
+    return text in _BEHIND_A_NAME or (len(text) > 3 and _SPELLED.get(text.lower()) in (*_BEHIND_A_NAME, "d"))
 
 
 def claimed_unit(heading: str) -> str:
@@ -248,6 +287,11 @@ def with_seconds(seconds: float) -> str:
             size = seconds / one
             return f"{size:.0f} {unit}" if abs(size) >= _WHOLE else f"{size:.3g} {unit}"
     return f"{seconds:.3g} s"
+
+
+def unit_of_axis(seconds: float) -> tuple[str, float]:
+    """Return the unit in which an axis of a time so long is easily read, s or more, and its length in s."""
+    return next((unit, one) for unit, one, least in _EASY if seconds >= least or unit == "s")
 
 
 def units_of(measured: Run | Model) -> str:

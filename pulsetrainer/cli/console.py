@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 _PIPE_WIDTH = 110
-_COMMAND = re.compile(r"`[^`]*`|\bpulsetrainer [^,;()`]*")  # what is copied
-_KEPT = "\0"  # a blank between whose words no line ends
+_COMMAND = re.compile(r"`[^`]*`|\bpulsetrainer [^,;()`]*")  # commands, which a person copies
+_KEPT = "\0"  # stands for a blank at which no line may end
 
 
 def plain(value: Any) -> Any:
@@ -97,14 +97,14 @@ class Screen:
     def result(self, payload: Any, failed: QualityError | None = None) -> None:
         """Write the one JSON object of this command, a mapping or a dataclass, when it was asked for.
 
-        It also says which quality gate ``failed``, which ``end`` says to a person.
+        It includes the quality gate that ``failed``; to a person ``end`` tells it.
         """
         if self.as_json:
             document = {"schema": 1, "command": self.command} | plain(payload)
             if failed is not None:
                 document["error"] = tables.picked(failed, "kind", "message", "hint")
-            universal = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
-            sys.stdout.write(json.dumps(document, ensure_ascii=not universal) + "\n")
+            is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+            sys.stdout.write(json.dumps(document, ensure_ascii=not is_utf8) + "\n")
 
     def end(self, failed: QualityError | None) -> None:
         """Exit with the code of a quality gate that failed, after everything was said; None: none did."""

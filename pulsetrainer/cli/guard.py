@@ -12,12 +12,11 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Sequence
-from types import FrameType
 from typing import Any
 
 from pulsetrainer.cli.console import say
 from pulsetrainer.cli.next_step import as_options, next_step
-from pulsetrainer.cli.starting import loaded
+from pulsetrainer.cli.starting import interrupt, loaded
 from pulsetrainer.cli.usage import check_apart, usage_of
 from pulsetrainer.errors import TRY, DataError, Interrupted, PulsetrainerError, UsageError
 
@@ -92,10 +91,6 @@ def hush_libraries(argv: Sequence[str]) -> None:
 
 def end_like_ctrl_c() -> None:
     """Let a closed terminal, or a batch system that ends the job, stop the output and keep the data."""
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # not under nohup

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from os.path import realpath  # a link to itself is told when it is read
+from os.path import realpath  # a link to itself is refused when it is read
 from pathlib import Path
 
 import typer
@@ -18,7 +18,7 @@ _FIGURES = ("png", "svg", "pdf")
 
 
 def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
-    """Refuse to write what a command makes over what it makes that from, which nobody could get back."""
+    """Refuse an output that is an input of the command as well: it would be lost."""
     if context.info_name in _IN_PLACE:
         return
     for path in outputs:
@@ -44,7 +44,7 @@ def check_ending(path: Path, context: typer.Context) -> None:
 
 
 def _check_text(path: Path, what: str, right: str, then: str) -> None:
-    """A browser goes by the ending, and a file of settings without one would not be found again."""
+    """Refuse the ending of another format: a browser goes by it, and so does who looks for settings."""
     ending = path.suffix.lower()
     if is_no_file(path):
         return
@@ -60,7 +60,7 @@ def figure_format(path: Path, what: str, *more: str) -> str:
     form, known = path.suffix.lower().lstrip("."), (*_FIGURES, *more)
     if form in known:
         return form
-    with suppress(OSError):  # a folder, or one that is locked, is told when it is looked at
+    with suppress(OSError):  # a folder is refused later, by its own words
         if path.is_dir():
             return _FIGURES[0]
     written_as = f"{what} is written as {', '.join(known[:-1])} or {known[-1]}"

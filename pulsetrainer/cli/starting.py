@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from types import FrameType
 
 _EXIT = 130  # of errors.Interrupted; that is not here yet
 _SAID = "stopped by you; nothing was written"
 _AS_JSON = '{"schema": 1, "command": "", "error": {"kind": "interrupted", "message": "%s", "hint": "%s"}}\n'
 _AGAIN = "run the command again"
+_SAME_S = 2.0  # a hand that trembles, or `timeout`, signals twice
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
@@ -40,11 +42,27 @@ def main() -> None:
     try:
         run()
     finally:
-        if heard:  # all is said: to end needs no words
-            signal.signal(signal.SIGINT, signal.SIG_DFL)
+        if heard:  # all is said and done
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def loaded() -> None:
     """Let Ctrl-C be an exception from now on, which commands know how to end with."""
     if signal.getsignal(signal.SIGINT) is _stop:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, interrupt)
+
+
+class _Once:
+    """Raises KeyboardInterrupt, but not again for what comes right after: by then data is being saved."""
+
+    def __init__(self) -> None:
+        self._heard_s = float("-inf")
+
+    def __call__(self, _number: int, _frame: FrameType | None) -> None:
+        now_s = time.monotonic()
+        if now_s - self._heard_s > _SAME_S:
+            self._heard_s = now_s
+            raise KeyboardInterrupt
+
+
+interrupt = _Once()

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isqrt
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,7 @@ Smoothing = float | Literal["auto"]
 # The dense path holds about ten matrices of n_q^2 numbers at its peak; above this it goes matrix-free.
 DENSE_BYTES = 1_000_000_000
 _DENSE_COPIES = 10
+_MOST_ALTERNATIONS = 200
 # A correlation of input and output above this tells by itself whether the loop rises or falls.
 CLEAR = 0.5
 _SIGN_LEVELS = 24
@@ -111,7 +113,7 @@ def identify(
 ) -> Identified:
     """Fit weights mu >= 0 and a free offset to one or several records.
 
-    Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 82 levels) are solved by
+    Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 83 levels) are solved by
     ``large.solve``, which needs none.
 
     All ``records`` share one set of weights and one offset; inputs outside the range of the ``plane`` are
@@ -155,12 +157,18 @@ def _signed(
     samples: int,
 ) -> Identified:
     """Fit weights of either sign."""
-    if reading != "continuous" or method != "joint" or not fits_dense(plane):
-        most_dense = int(np.sqrt(2.0 * np.sqrt(DENSE_BYTES / (8 * _DENSE_COPIES))))
+    if reading != "continuous" or method != "joint":
         raise ArgumentError(
-            f"signed weights are fitted jointly, in the continuous reading, on planes of at most "
-            f"{most_dense} levels, got {method}, {reading} and {plane.n_h}",
-            hint="leave method and reading out, and use fewer levels",
+            f"signed weights are fitted jointly, in the continuous reading, got {method} and {reading}",
+            hint="leave method and reading out",
+        )
+    if not fits_dense(plane):
+        cells = isqrt(DENSE_BYTES // (8 * _DENSE_COPIES))
+        most = (isqrt(8 * cells + 1) - 1) // 2  # n (n + 1) / 2 <= cells
+        raise ArgumentError(
+            f"weights of either sign, which this record is fitted with, have at most {most} levels, got "
+            f"{plane.n_h}: more take over {DENSE_BYTES / 1e9:.0f} GB",
+            hint=f"give `levels` {most} or less, or `form` direct",
         )
     upright, zero = levelled(records)
     choice = choose(upright, plane, reading, signed=True) if smoothing == "auto" else Choice(smoothing, ())
@@ -291,9 +299,7 @@ def _fit_large(
     return large.solve(node_sums(plane, records, reading), smoothing)
 
 
-def _alternate(
-    equations: NormalEquations, gram: FloatArray, limit: int = 200
-) -> tuple[FloatArray, float, int]:
+def _alternate(equations: NormalEquations, gram: FloatArray) -> tuple[FloatArray, float, int]:
     """Alternate between the offset and the weights until neither moves (Carneiro et al. 2018, section 3).
 
     The plain alternation creeps: ten thousand rounds at 48 levels. Its moves are a piecewise linear
@@ -303,7 +309,7 @@ def _alternate(
     spread = np.sqrt(max(equations.output_square / equations.weight_sum - offset**2, 0.0))
     passive: BoolArray | None = None
     before: tuple[float, float] | None = None
-    for iteration in range(1, limit + 1):
+    for iteration in range(1, _MOST_ALTERNATIONS + 1):
         found = nnls.solve(gram, equations.moment - offset * equations.row_sum, passive=passive)
         passive = found.passive
         moved = equations.offset(found.x) - offset
@@ -315,5 +321,5 @@ def _alternate(
         before = (offset, moved)
         offset += change
     raise ConvergenceError(
-        f"offset and weights still moved after {limit} alternations", hint="use the joint method"
+        f"offset and weights still moved after {_MOST_ALTERNATIONS} alternations", hint="use the joint method"
     )

@@ -17,7 +17,7 @@ from pulsetrainer.core.memory import negative_saturation, trace
 from pulsetrainer.core.operator import rows
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 
-# Deviations, of the output's span: of the zero, the lag in s, the density, and what goes with none of them.
+# Standard deviations before anything is known, of the output's span: zero, lag (s), density, and noise.
 # The density is held so stiff that one path cannot explain by it what is not of the plane.
 _ZERO, _LAG_S, _DENSITY, _NOISE = 0.01, 0.005, 0.01, 0.003
 _LEVELS = 24
@@ -48,7 +48,7 @@ class Path:
         """Return the path at some of its samples only."""
         return Path(self.rate[some], self.relays[some])
 
-    def along(self, other: Path) -> FloatArray:
+    def covariance_with(self, other: Path) -> FloatArray:
         """Covariance (m, k) of what is missed here and there, span squared."""
         lag = np.outer(self.rate, _LAG_S**2 * other.rate)
         return _ZERO**2 + lag + _DENSITY**2 * (self.relays @ other.relays.T)
@@ -60,9 +60,9 @@ class Path:
 
 
 def elsewhere(known: Path, missed: FloatArray, new: Path) -> tuple[FloatArray, FloatArray]:
-    """Expect what is missed (k,) on a new path from what was (m,) on a known one, and its variance (k,)."""
-    between = new.along(known)
-    noisy = known.along(known) + _NOISE**2 * np.eye(known.rate.size)
+    """Expected miss (k,) on a new path, given the miss (m,) on a known one, and its variance (k,)."""
+    between = new.covariance_with(known)
+    noisy = known.covariance_with(known) + _NOISE**2 * np.eye(known.rate.size)
     solved = np.linalg.solve(noisy, np.column_stack((missed, between.T)))
     return between @ solved[:, 0], new.variance - np.sum(between * solved[:, 1:].T, axis=1)
 

@@ -23,7 +23,7 @@ from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import counted_output
-from pulsetrainer.diagnosis import advised, residual, wording
+from pulsetrainer.diagnosis import advice_wording, residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
@@ -53,7 +53,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     inputs = np.concatenate([record.input for record in problem.records])
-    bench = advised.Bench(
+    bench = advice_wording.Bench(
         scale,
         model.input_unit,
         state.question.timed,
@@ -114,7 +114,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         empty=empty,
         in_model=state.in_model,
     )
-    said = advised.advice(_advice(state), bench, found.next_command, found.correctable)
+    said = advice_wording.advice(_advice(state), bench, found.next_command, found.correctable)
     return replace(found, next_experiment=said)
 
 

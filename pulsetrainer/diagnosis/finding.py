@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.evidence import Evidence
 
-TOLD_BESIDE = ("at bound", "may be a fault", "may be wear", "not added")  # the name stands
+AT_BOUND, A_FAULT, MAY_BE_WEAR, NOT_ADDED = "at bound", "may be a fault", "may be wear", "not added"
+TOLD_BESIDE = (AT_BOUND, A_FAULT, MAY_BE_WEAR, NOT_ADDED)  # doubts with which the name stands
 
 
 @dataclass(frozen=True)
@@ -43,5 +44,5 @@ class Finding:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether it predicts worse, does not repeat or may be nothing."""
+        """Whether any doubt speaks against it but those of ``TOLD_BESIDE``."""
         return any(one not in TOLD_BESIDE for one in self.doubts)

@@ -1,6 +1,6 @@
 """Evidence in words.
 
-Here and in ``advised`` a diagnosis is put into English, except for the texts in the files of the causes.
+Here and in ``advice_wording`` a diagnosis is put into English; causes have texts of their own in their files.
 """
 
 from __future__ import annotations

@@ -32,10 +32,7 @@ _WIDEST = 64  # columns that one matrix may give
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """The vectors of a file, all of the length that most of them share, and its rate.
-
-    ``left_out`` says of what else there is why it is no column.
-    """
+    """The longest vectors of a file, and its rate; ``left_out`` says why all else is no column."""
 
     values: Mapping[str, FloatArray]  # each (n,)
     rate_Hz: float | None
@@ -143,7 +140,7 @@ def _read_wav(path: Path) -> Columns:
 
 
 def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Columns:
-    """Return the vectors of the length that most have, and the rate if a number says it."""
+    """Return the longest vectors, and the rate if a number says it."""
     vectors: dict[str, FloatArray] = {}
     left_out: dict[str, str] = {}
     rate = None

@@ -1,4 +1,4 @@
-"""An HDF5 group back into an artefact dataclass; everything that does not fit is a ``DataError``.
+"""An HDF5 group back into an artefact dataclass; a field that does not fit is a ``DataError``.
 
 The file may come from anywhere: truncated, damaged, edited, or made by other programs. Nothing is
 believed before it is checked, not even a shape: a damaged size must not fill the memory.

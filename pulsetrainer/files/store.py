@@ -1,4 +1,4 @@
-"""Artefacts on disk: any kind into HDF5 and back, whole or not at all.
+"""Artefacts on disk: any kind into HDF5 and back, whole or not at all; a newer format is refused.
 
 The file format: root attributes ``kind``, ``format_version``, ``title``, ``created``, ``history``,
 ``provenance`` (JSON), ``samples`` where the kind has a time axis; then the kind's fields as ``schema`` says.

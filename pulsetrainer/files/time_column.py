@@ -25,7 +25,8 @@ _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
 _DATES = frozenset(["date", "datum", "fecha", "data", "datetime", "date time", "date/time"])
-_CLOCKS = frozenset(["utc", "gmt", "local", "epoch", "unix"])  # whose time it is, where its unit would stand
+# whose time it is, or that it has no unit, where its unit would stand
+_CLOCKS = frozenset(["utc", "gmt", "local", "epoch", "unix", "1"])
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
@@ -70,7 +71,8 @@ def time_of(
     heading = table.names[table.index(time)]
     unit, notes = _taken_as(table, heading)
     table = replace(table, units={**table.units, heading: unit}) if unit else table
-    words = f"time from {split_unit(heading)[0]} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
+    name = split_unit(heading)[0]
+    words = f"time from {name} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
     stamps, again = _begun_again(table.check_finite(time, remedy=LEAVE_OUT), unit or "s")
     if again:
         table = replace(table, columns={**table.columns, heading: stamps})
@@ -79,7 +81,7 @@ def time_of(
     step = steps_of(time_s).median if time_s.size > 1 else np.nan
     if not unit and step >= _SLOW_S and time_s.size >= _MANY:
         said = f"the samples of {table.path} are {step:g} s apart if its time is in seconds, as assumed"
-        notes = (*notes, f"{said} (if it is in ms, write the heading as '{heading} [ms]')")
+        notes = (*notes, f"{said} (if it is in ms, write the heading as '{name} [ms]')")
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return Time(time_s, words, notes)

@@ -58,8 +58,8 @@ def course(found: Diagnosis) -> Figure:
         _drawn(below, found, found.output - found.after, **MODEL, label="with them")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
-    name = "sample number" if _timeless(found) else label("time", "s")
-    below.set_xlabel(name if len(found.records) == 1 else f"{name}, recordings one after another")
+    several = "" if len(found.records) == 1 else ", recordings one after another"
+    panels.name_abscissa(below, panels.SAMPLE_NUMBER if _timeless(found) else "time", several)
     panels.headroom(below)
     return figure
 
@@ -110,6 +110,8 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     axes.set(xlabel=_folded(axis_of(one, input_quantity)), ylabel=label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
+    if one.name == "time":
+        panels.name_abscissa(axes)
     return figure
 
 
@@ -140,6 +142,7 @@ def axis_of(one: Profile, input_quantity: str = "") -> str:
         "direction": f"direction of the {name}",
         "level": label(name, one.unit),
         "frequency": label("frequency of the error", one.unit),
+        "time": "time",  # its unit is that of the axis
     }
     return known.get(one.name, label(one.name, one.unit))
 

@@ -65,7 +65,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     if explained:
         yield Facts("in this table", explained)
     yield Facts("evidence", {str(k): text for k, text in enumerate(evidence(found), start=1)})
-    yield Facts("next", {"": found.next_experiment})
+    yield Facts("next", {" " * k: one for k, one in enumerate(found.advice)})
 
 
 def evidence(found: Diagnosis) -> list[str]:

@@ -183,7 +183,7 @@ def _diagnosis(found: Diagnosis) -> dict[str, Any]:
         ],
         **picked(found, "rms_percent", "noise_percent"),
         **picked(found, "static_percent", "extended_percent", "floor_percent"),
-        "next": found.next_experiment,
+        "next": " ".join(found.advice),
     }
 
 

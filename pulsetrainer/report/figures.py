@@ -83,10 +83,12 @@ def run(record: Run) -> Figure:
     output_label = label(record.output_quantity, record.output_unit)
     above.set_ylabel(input_label)
     title = f"{record.signal} signal over time" if record.signal else "record over time"
-    above.set_title(title[:1].upper() + title[1:] + ("" if record.complete else ", incomplete"))
+    title = f"{record.signal} over time" if "." in record.signal else title[:1].upper() + title[1:]  # a file
+    above.set_title(title + ("" if record.complete else ", incomplete"))
     if record.reference is not None:
         panels.headroom(above)
-    below.set(ylabel=output_label, xlabel=name)
+    below.set_ylabel(output_label)
+    panels.name_abscissa(below, name)
     loop = right.subplots()
     panels.orbit(loop, record.input, record.output, **FINE)
     loop.set(xlabel=input_label, ylabel=output_label)
@@ -136,7 +138,8 @@ def playback(played: Playback) -> Figure:
     force.set_title(panels.titled(asked) + ("" if played.complete else ", incomplete"))
     current.set_ylabel(label(panels.quantity_of(played.scaled.input_unit), played.scaled.input_unit))
     error.axhline(0.0, **GUIDE)
-    error.set(ylabel="current error\n[% of range]", xlabel=label("time", "s"))
+    error.set_ylabel("current error\n[% of range]")
+    panels.name_abscissa(error)
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)

@@ -17,7 +17,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
 from pulsetrainer.artefacts import Fit, FloatArray, Model, ModelEvaluation, Waveform, WaveformEvaluation
-from pulsetrainer.artefacts.units import counted, shown
+from pulsetrainer.artefacts.units import counted, shown, unit_of_axis
 from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.fewer_points import extremes, path
 from pulsetrainer.report.names import NAMES, digits
@@ -46,21 +46,48 @@ _DENSITY_REACH = 2.0
 # what stands between two dollars as a formula, whatever the settings say
 _TITLE, _SQUARE_TITLE = 48, 30
 _CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
+SAMPLE_NUMBER = "sample number"
 _QUANTITIES = {
     "N": "force", "A": "current", "T": "flux density", "V": "voltage", "Pa": "pressure", "N*m": "torque",
 }  # fmt: skip
 
 
 def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:
-    """Return the horizontal axis of a record with its label: time, or else the sample number.
+    """Return the horizontal axis of a record, and what it is: time in s, or else the sample number.
 
     Time stamps with a date are counted from the first one.
     """
     if time_s is None:
-        return np.arange(n, dtype=np.float64), "sample number"
+        return np.arange(n, dtype=np.float64), SAMPLE_NUMBER
     if abs(time_s[0]) > _CLOCK * (time_s[-1] - time_s[0]):
-        return time_s - time_s[0], label("time since the first sample", "s")
-    return time_s, label("time", "s")
+        return time_s - time_s[0], "time since the first sample"
+    return time_s, "time"
+
+
+class _TicksIn(MaxNLocator):
+    """Round numbers of a unit so many seconds long."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__("auto", steps=[1, 2, 2.5, 5, 10])
+        self.seconds = seconds
+
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
+        """Return the ticks, in seconds."""
+        ticks = super().tick_values(vmin / self.seconds, vmax / self.seconds)
+        return [self.seconds * tick for tick in ticks]
+
+
+def name_abscissa(axes: Axes, name: str = "time", behind: str = "") -> None:
+    """Label the horizontal axis: a time, drawn in s, is read in s, min, h or d by the length of the axis.
+
+    The curves must be there already; ``behind`` stands behind the unit.
+    """
+    low, high = axes.get_xlim()
+    unit, one = ("1", 1.0) if name == SAMPLE_NUMBER else unit_of_axis(high - low)
+    axes.set_xlabel(label(name, unit) + behind)
+    if one > 1.0:
+        axes.xaxis.set_major_locator(_TicksIn(one))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / one:g}"))
 
 
 def trace(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
@@ -209,7 +236,8 @@ def residual(axes: Axes, of: Fit | ModelEvaluation) -> None:
     axes.axhline(0.0, **GUIDE)
     for y in (-of.rms, of.rms):
         axes.axhline(y, **{**GUIDE, "color": INK, "zorder": 3})
-    axes.set(xlabel=name, ylabel=label("residual", of.output_unit))
+    axes.set_ylabel(label("residual", of.output_unit))
+    name_abscissa(axes, name)
     axes.set_title(f"Residual: rms {of.rms_percent:.3g} % of span (dotted: ± rms)")
 
 
@@ -252,7 +280,8 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
     below.axhline(0.0, **GUIDE)
     for drive, style in ((played.scaled, SCALED), (played.compensated, COMPENSATED)):
         trace(below, played.time_s, 100.0 * (drive.output - played.target) / played.full_force, **style)
-    below.set(xlabel=label("time", "s"), ylabel="error\n[% of full force]")
+    below.set_ylabel("error\n[% of full force]")
+    name_abscissa(below)
 
 
 def inversions(played: Sequence[WaveformEvaluation]) -> list[str]:
@@ -284,7 +313,8 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequ
         trace(above, x, measured, **style, label=shown)
         trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
     above.set(ylabel=label("force", first.output_unit), title=f"{first.name}, one beat")
-    below.set(xlabel=label("time", "s"), ylabel="error\n[% of full force]")
+    below.set_ylabel("error\n[% of full force]")
+    name_abscissa(below)
     panel.legend(loc="outside lower center", ncols=2, columnspacing=0.8, handlelength=1.5, handletextpad=0.5)
 
 
@@ -335,7 +365,7 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label="compensated")
     below.set_ylabel(label(f"drive: {driven or quantity_of(waveform.input_unit)}", waveform.input_unit))
-    below.set_xlabel(label("time", "s"))
+    name_abscissa(below)
     unscored(above, waveform)
     unscored(below, waveform, name="")
     if not waveform.scored[0]:
@@ -382,20 +412,21 @@ def unscored(axes: Axes, waveform: Waveform, name: str = "not scored") -> None:
 def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray) -> None:
     """Draw how much warmer the copper was than at calibration, as the duty tells, arrays (w,) in s and K."""
     trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
-    _finish_temperature(axes, "time [s]", 0.4)  # a low panel, of which a legend is a large part
+    _finish_temperature(axes, 0.4)  # a low panel, of which a legend is a large part
 
 
 def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
     """Draw how much warmer the copper was before each repeat (r,), K."""
     axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
-    _finish_temperature(axes, "repeat", 0.16)
+    _finish_temperature(axes, 0.16)
+    axes.set_xlabel("repeat")
     axes.margins(x=0.04)  # a point is whole at either end
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _finish_temperature(axes: Axes, over: str, share: float) -> None:
+def _finish_temperature(axes: Axes, share: float) -> None:
     axes.axhline(0.0, **GUIDE)
-    axes.set(ylabel="coil, against\ncalibration [K]", xlabel=over)
+    axes.set_ylabel("coil, against\ncalibration [K]")
     headroom(axes, share)
 
 

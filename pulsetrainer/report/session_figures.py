@@ -26,6 +26,7 @@ def course(session: Session) -> Figure:
             "nothing was pressed yet, so there is nothing to draw", hint="begin the session again"
         )
     warm_s, warm_K = session.temperature_s, session.temperature_K
+    lowest = None
     if warm_s is None or warm_K is None:
         figure = Figure(figsize=(COLUMN_IN, 4.0), layout="constrained")
         above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
@@ -39,7 +40,8 @@ def course(session: Session) -> Figure:
     near = np.abs(session.time_s - middle) <= 0.5 * SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
     panels.trace(above, session.time_s[near], session.output[near], **COMPENSATED, label="measured")
-    above.set(ylabel=label("force", session.output_unit), xlabel=label("time", "s"))
+    above.set_ylabel(label("force", session.output_unit))
+    panels.name_abscissa(above)
     stopped = ", stopped early" if session.ended_early else ""
     above.set_title(f"Session: {SHOWN_S:g} seconds from its middle{stopped}")
     panels.headroom(above)
@@ -50,7 +52,10 @@ def course(session: Session) -> Figure:
     )
     below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=BLUE, label="mean error")
     below.set_ylabel("error\n[% of full force]")
-    below.set_xlabel(label("start of the beat", "s") if warm_s is None else "")
+    if lowest is None:
+        panels.name_abscissa(below, "start of the beat")
+    else:
+        panels.name_abscissa(lowest)
     below.set_ylim(bottom=0.0)
     panels.headroom(below, 0.3, markerscale=3.0)
     return figure

@@ -56,7 +56,7 @@ class _Image:
 
 
 def find_compiler() -> list[str]:
-    """Return the command of a C compiler: $CC, ``cc``, or ziglang; DeviceError where there is none."""
+    """Return the command of a C compiler; DeviceError where there is none."""
     for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
         words = name.split()
         if words and shutil.which(words[0]):
@@ -64,7 +64,7 @@ def find_compiler() -> list[str]:
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc"]
     raise DeviceError(
-        "the virtual bench needs a C compiler once, but neither cc nor ziglang is installed",
+        "the virtual bench needs a C compiler once, and none of $CC, cc, gcc, clang and ziglang is here",
         hint="install one: `sudo apt install gcc libc6-dev`, or without root `pip install ziglang`",
     )
 
@@ -124,7 +124,7 @@ def find_emulator() -> str:
 
 def _not_installed(programs: str) -> DeviceError:
     return DeviceError(
-        f"the emulated device (qemu:) needs {programs}, not found on this computer",
+        f"the emulated device (qemu:) needs {programs}, which was not found on this computer",
         hint=f"install: `sudo apt install {DEBIAN_PACKAGES}`; or simulate without them: `port` bench:",
     )
 
@@ -139,7 +139,7 @@ def _place_in(folder: Path) -> str:
 
 @functools.cache
 def _folder_of_this_process(why: str) -> Path:
-    """Return a folder that goes with this process: each compiles anew; DeviceError where there is none."""
+    """Return a temporary folder, deleted when this process ends; DeviceError ``why`` if none can be made."""
     try:
         folder = Path(tempfile.mkdtemp(prefix="pulsetrainer-"))
     except OSError as error:

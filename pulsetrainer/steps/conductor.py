@@ -20,13 +20,13 @@ from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.device.codes import HEAT_TAU_S
 from pulsetrainer.device.heat import added
 from pulsetrainer.steps.drive_layout import RAMP_S
+from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from pulsetrainer.steps.invertible import major_loop
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.extended import Extended
 
 RATE_HZ = 1000.0
-SLEW_A_PER_S = 30.0
 BLEND_S = 0.15
 HOT, COOL = 0.95, 0.75  # of the heat at which the device stops: where a session pauses, and goes on
 REST_S = 0.25  # of a pause, between two looks whether it is over
@@ -146,7 +146,7 @@ class Conductor:
 
         self._pulses, self._reach, self._rhythm = tuple(pulses), reach, rhythm
         self._decide, self._give = decide, give
-        self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=SLEW_A_PER_S, band_Hz=BAND_HZ)
+        self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=DEVICE_SLEW_A_PER_S, band_Hz=BAND_HZ)
         self._static = extended.static
         self._rest_force = extended.polarity * extended.static.saturation[0]
         self._heat, self._heated, self._cooling_s = heat, heated, cooling_s

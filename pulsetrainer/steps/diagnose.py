@@ -38,9 +38,9 @@ def diagnose(
     runs
         Of one device, in the units of the model.
     quick
-        Only screen: it takes seconds, strengths are linearised, and nothing is found to extend the model by.
+        Only screen: it takes seconds, strengths are linearised, and nothing can be extended by what is found.
     seed
-        Of the simulated null distribution.
+        Seed of the simulated null distribution.
     names
         Names of the runs and, last, of the model, for messages.
     progress

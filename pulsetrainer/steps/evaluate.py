@@ -20,7 +20,7 @@ from pulsetrainer.artefacts import (
     Session,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import counted, same_units, units_of
+from pulsetrainer.artefacts.units import counted, same_units, units_of, with_seconds
 from pulsetrainer.core import metrics, wild
 from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, second_stroke
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -35,6 +35,9 @@ from pulsetrainer.steps.one_thread import one_thread
 
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
+_AT_THE_END = 0.1  # of the model's range, for a record that begins there
+_SETTLED = 3.0  # time constants: then a twentieth is left of where a slow cause began
+_SOON = 0.005  # of the record: what has passed within such a time matters little
 _TOLD = 0.1  # % of the samples, in figures
 _MISSED = 3.0  # times the error of all that follows: a first stroke that outputs do not tell from others ...
 # ... and that every model misses so far is that of a device that was never cycled before
@@ -181,6 +184,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         if one.start != "known":
             notes.append(f"{name} does not reach the ends of {title}; state before it: {one.start}")
+        notes += _begun_elsewhere(name, run, title, model)
         misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
     return Evaluation(
@@ -197,6 +201,23 @@ def _wild_words(name: str, run: Run) -> list[str]:
         count += int(np.count_nonzero(wild.by_chance(found, part.input, reach)))
     looks = counted(count, "sample", "looks", "look")
     return [f"{looks} wild in {name}, and count in its errors"] if count else []
+
+
+def _begun_elsewhere(name: str, run: Run, title: str, model: Model) -> list[str]:
+    """Say that a slow cause of a model begins at rest, where the run does not begin at the low end."""
+    low, high = input_range(model)
+    times = [(p.value, e.cause) for e in model.extensions for p in e.parameters if p.unit == "s"]
+    tau_s, cause = max(times, default=(0.0, ""))
+    if run.time_s is None or tau_s < _SOON * (run.time_s[-1] - run.time_s[0]):
+        return []
+    if run.input[0] <= low + _AT_THE_END * (high - low):
+        return []
+    return [
+        (
+            f"{name} begins away from the low end of its input, where {title} begins at rest: until about "
+            f"{with_seconds(_SETTLED * tau_s)} have passed, its {cause} may be another than the device's"
+        )
+    ]
 
 
 def _is_fitted_to(model: Model, run: Run) -> bool:

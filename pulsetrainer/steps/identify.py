@@ -61,8 +61,8 @@ def identify(
     runs
         Measured input and output; all in the same units.
     levels
-        Number of levels n_h; the model has n_h (n_h + 1) / 2 cells. None: 48, or one for every two samples of
-        a shorter record.
+        Number of levels n_h, at most 83 in the signed form; the model has n_h (n_h + 1) / 2 cells. None: 48,
+        or one for every two samples of a shorter record.
     form
         "direct", "dual" or "signed"; "auto": the one that predicts blocks that were not fitted, the simplest
         where others are not much better.

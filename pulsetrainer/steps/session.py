@@ -66,7 +66,7 @@ def check_model(model: Model) -> None:
 
 
 def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None]) -> Reach:
-    """Return the forces that every beat reaches with the range of the input, in the long run.
+    """Return the forces that every beat reaches with the range of the input, cold as well as in the long run.
 
     The model is given each pulse as its input, over the whole range and at the slowest and the fastest rate,
     until its slowest cause has settled: heat, lag and creep keep a pulse from the ends of the static loop.
@@ -118,7 +118,7 @@ def perform(
 
     Between the slowest and the fastest of the ``rates`` (beats a minute; None: its own) every pulse reaches
     its full amplitude. A beat is decided and made ``lead_s`` before its time. ``track_heat`` tells the
-    coil's temperature from the duty, before and all the time, and makes up for the force that it costs;
+    coil's temperature from the duty, before and throughout, and makes up for the force that it costs;
     None: where the model has a thermal term and knows the coil. ``watch`` gets each piece of telemetry.
 
     DataError where the model cannot be used; DeviceError where the model foretells a force
@@ -247,7 +247,7 @@ def session(
     variability, respiration, ectopic
         Irregularity of the rhythm, %: see ``core.rhythm.Rhythm``.
     seed
-        Of the rhythm, and of the order of a quiz.
+        Seed of the rhythm, and of the order of a quiz.
     changes
         What changes when.
     quiz, answers

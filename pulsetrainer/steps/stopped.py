@@ -17,7 +17,7 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
     if fault == INTERRUPTED:
         raise Interrupted(f"stopped by you during {what}; the output was switched off first", kept=kept)
     raise DeviceError(
-        f"{fault}, during {what}",  # what is wrong first: it may be that current flows on
+        f"{fault}, during {what}",  # the fault first: it may say that current still flows
         hint=remedy or UNKNOWN_REMEDY,
         kept=kept,
     )
@@ -29,7 +29,7 @@ def kept_in(where: object, many: int, what: str) -> str:
 
 
 def in_part(fault: str, begun_s: float) -> str:
-    """Say of a fault, whose own time counts from the beginning of its part, when a later part began."""
+    """Add to a fault when its part began: the time in it counts from there."""
     if begun_s == 0 or fault in ("", INTERRUPTED):
         return fault
     return f"{fault}, in the part that began at {begun_s:.1f} s"

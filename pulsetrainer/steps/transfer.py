@@ -22,8 +22,8 @@ _STEP_S = 0.016  # between the samples that are looked at: half a period of the 
 _PARTS = 5  # of a beat, of which each is foretold by the others
 # Set together with the deviations of ``core.missed``: docs/how-to/refine.md says on what
 _REFINED = 1.2  # times the noise: what refining could not take out of its own pulse says nothing of another
-_TOLD = 0.65  # of what is missed in a part of the beat, in squares, has to be told by the other parts
-_UNCERTAIN = 0.007  # of the variance may be left on the new pulse, or it goes where the other never was
+_TOLD = 0.65  # of the square of what is missed in a part of the beat: so much the other parts must predict
+_UNCERTAIN = 0.007  # of the variance: with more left, the new pulse goes where the other never was
 
 
 def transfer(
@@ -33,9 +33,9 @@ def transfer(
 
         ask' = target + E[missed on the path of this drive | missed on the path of the refined one]
 
-    What is missed is M[u] less the force measured, with M the model; it is taken for a zero, a lag and a
+    What is missed is M[u] less the force measured, with M the model; it is modelled as a zero, a lag and a
     density on the Preisach plane that the model lacks (``core.missed``). What belongs to one place of one
-    pulse is not transferred, and nothing is where nobody knows whether it still holds: see Raises.
+    pulse is not transferred. Where it may not hold for the new pulse, DataError is raised instead.
 
     Parameters
     ----------

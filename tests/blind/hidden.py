@@ -165,6 +165,10 @@ def _of_different_families(rng):
     return names
 
 
+class RefusedByTheDeviceError(RuntimeError):
+    """The device trips at every amplitude: by the force, or as its sensor tells what cannot be."""
+
+
 def measure(case: Case) -> Data:
     """Play the diagnostic signal on the bench; return what the device reports.
 
@@ -175,7 +179,7 @@ def measure(case: Case) -> Data:
         if record is not None:
             break
     else:
-        raise RuntimeError(f"{case.port} cannot be played")
+        raise RefusedByTheDeviceError(case.port)
     records, range_high = [_spoilt(case, record)], high
     if "condition-change" in case.causes:
         change = case.truth["condition-change"]

@@ -38,7 +38,8 @@ def _share(rows, test) -> str:
 def words(rows) -> str:
     """Return the figures in words, with 95 % confidence bounds."""
     crashed = [r for r in rows if "crash" in r]
-    rows = [r for r in rows if "crash" not in r]
+    refused = [r for r in rows if "refused" in r]
+    rows = [r for r in rows if "crash" not in r and "refused" not in r]
     kinds = {}
     for row in rows:
         kinds.setdefault(row["kind"].partition(":")[0], []).append(row)
@@ -73,6 +74,7 @@ def words(rows) -> str:
         f"| ... cases with 80 % of it | {_share(oracle.tolist(), lambda x: x >= 0.8)} | |",
         f"| seconds of processor time, median and largest | {_median(seconds)}, {max(seconds):.0f} | |",
         f"| crashes | {len(crashed)} | 0 |",
+        f"| cases that the device itself refuses to play | {len(refused)} | |",
         "",
         "| cause | size [%] | right | class | parameter error [%] | covered | gain/oracle [%] | otherwise |",
         "|---|---|---|---|---|---|---|---|",
@@ -83,6 +85,7 @@ def words(rows) -> str:
         own = [r for r in (*drawn, *kinds.get("weak", [])) if r["causes"][0] == name]
         lines.append(f"| {name} | {limit(own, name)} | {len(own)} |")
     lines += [f"\ncrash: {r['kind']} {r['seed']} {r['crash']}" for r in crashed]
+    lines += [f"\nrefused: {r['kind']} {r['seed']} {r['refused']}" for r in refused]
     return "\n".join(lines)
 
 

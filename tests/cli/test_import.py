@@ -270,7 +270,9 @@ def test_a_time_of_whole_steps_in_another_unit_is_no_count(run, tmp_path, headin
     assert done.json["facts"]["rate_Hz"] == pytest.approx(rate_Hz)
 
 
-@pytest.mark.parametrize(("heading", "said"), [("Zeit", True), ("Zeit [s]", False), ("Zeit in ms", False)])
+@pytest.mark.parametrize(
+    ("heading", "said"), [("Zeit", True), ("Zeit [-]", True), ("Zeit [s]", False), ("Zeit in ms", False)]
+)
 def test_a_slow_record_without_a_unit_of_time_may_be_one_in_milliseconds(run, tmp_path, heading, said):
     """It is taken as seconds, which is said, and how to say otherwise."""
     t = 10.0 * np.arange(300)

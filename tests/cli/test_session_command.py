@@ -20,7 +20,7 @@ import pytest
 from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Session
 from pulsetrainer.files.store import read, read_any
-from pulsetrainer.steps.conductor import SLEW_A_PER_S
+from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from wording import refusal
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
@@ -174,7 +174,7 @@ def test_changes_of_a_script_come_at_the_next_beat(run, tmp_path):
     np.testing.assert_allclose(beats.interval_s[beats.start_s >= 3], 0.6)
     np.testing.assert_allclose(beats.amplitude, np.where(later, 50, 100))
     assert (beats.pulse[later] == 1).all()
-    assert np.abs(np.diff(kept.reference)).max() <= SLEW_A_PER_S / 1000 + 2e-4
+    assert np.abs(np.diff(kept.reference)).max() <= DEVICE_SLEW_A_PER_S / 1000 + 2e-4
 
 
 def test_the_rhythm_comes_from_the_seed(run, tmp_path):

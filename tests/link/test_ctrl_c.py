@@ -144,6 +144,8 @@ def test_the_output_is_off_first_and_it_is_said_what_there_is(
         time.sleep(seconds)
         sent_s = time.monotonic()
         process.send_signal(signal.SIGINT)
+        time.sleep(0.03)
+        process.send_signal(signal.SIGINT)  # a hand that trembles: what is being saved stays whole
         out, err = process.communicate(timeout=30)
     finally:
         process.kill()

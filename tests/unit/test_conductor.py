@@ -18,7 +18,8 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.steps.beat_errors import Ledger
-from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, SLEW_A_PER_S, Conductor, Play, Rest
+from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, Conductor, Play, Rest
+from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.performance import Performance
 from pulsetrainer.steps.programme import Change, Programme
@@ -90,7 +91,7 @@ def test_no_change_is_a_step(model, seed):
     rhythm = Rhythm(0.1, 0.1, 0.2, seed)
     _, given, parts = _conducted(model, _random(seed, minutes=0.5 if seed else 0.2), rhythm=rhythm)
     (current,) = parts
-    assert np.abs(np.diff(current)).max() <= SLEW_A_PER_S / RATE_HZ * (1 + 1e-9)
+    assert np.abs(np.diff(current)).max() <= DEVICE_SLEW_A_PER_S / RATE_HZ * (1 + 1e-9)
     assert current[0] == current[-1] == model.edges[0]
     assert current.min() >= model.edges[0]
     assert current.max() <= model.edges[-1]

@@ -238,12 +238,15 @@ def test_block_pivoting_matches_the_reference_on_random_problems():
 
 
 def test_dense_matrices_are_refused_beyond_the_stated_memory():
-    """82 levels fit into a gigabyte, 84 do not and go another way."""
-    assert identification.fits_dense(Plane.uniform(0.0, 1.0, 82))
+    """83 levels fit into a gigabyte, 84 do not and go another way; weights of either sign have none."""
+    assert identification.fits_dense(Plane.uniform(0.0, 1.0, 83))
     large = Plane.uniform(0.0, 1.0, 84)
     assert not identification.fits_dense(large)
+    records = [Record(np.linspace(0, 1, 200), np.linspace(0, 1, 200))]
     with raises(ArgumentError, "method too large", method="alternating"):
-        identify([Record(np.linspace(0, 1, 200), np.linspace(0, 1, 200))], large, method="alternating")
+        identify(records, large, method="alternating")
+    with raises(ArgumentError, "too many levels of either sign", most=83, levels=84):
+        identify(records, large, signed=True)
 
 
 # --- coverage in words ----------------------------------------------------------------------------------

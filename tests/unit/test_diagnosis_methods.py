@@ -16,7 +16,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import (
-    advised,
+    advice_wording,
     artefact,
     experiment,
     fast_causes,
@@ -527,7 +527,9 @@ def test_of_samples_without_time_it_is_time_that_lacks():
     said = diagnose(Question([Record(u, u + 0.01 * noise, dt_s=None)], -0.2, 2.3, np.random.default_rng(0)))
     assert said.lacks == ("time",)
     assert [one.names for one in said.evidence if one.kind == "lacks"] == [("time",)]
-    assert "the time of every sample" in advised.advice(said.advice, advised.Bench(said.scale, "A"))
+    assert "the time of every sample" in advice_wording.advice(
+        said.advice, advice_wording.Bench(said.scale, "A")
+    )
 
 
 def test_a_record_has_several_rates_by_its_way_or_by_its_time():
@@ -854,10 +856,13 @@ def test_every_kind_of_evidence_and_advice_has_words():
         said = wording.sentence(Evidence(kind, "creep" if kind == "tested" else "", figures, names), words)
         assert said.endswith(".")
         assert "{" not in said
-    for kind in advised.ADVICE:
+    for kind in advice_wording.ADVICE:
         names = ("heating", "delay", "creep", "step") if kind == "tied" else ("delay", "creep", "step")
-        for bench in (advised.Bench(Scale(), "A", ours=True), advised.Bench(Scale(), timed=False)):
-            said = advised.advice(Evidence(kind, figures=figures, names=names), bench)
+        for bench in (
+            advice_wording.Bench(Scale(), "A", ours=True),
+            advice_wording.Bench(Scale(), timed=False),
+        ):
+            said = advice_wording.advice(Evidence(kind, figures=figures, names=names), bench)
             assert "{" not in said
             assert ("delay, creep and step" in said) is (
                 kind.startswith(("tied", "none, s", "none, c"))
@@ -873,7 +878,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
 def test_nobody_is_asked_for_a_recording_without_end(shown_from, longer):
     """Four times as long is advice; a thousand times, or for ever, is none."""
     state = SimpleNamespace(detectable={"delay": shown_from * LIMITS.matters}, blind=("delay",), lacks=())
-    said = advised.advice(advice._to_see_more(state), advised.Bench(Scale(), "A", ours=True))
+    said = advice_wording.advice(advice._to_see_more(state), advice_wording.Bench(Scale(), "A", ours=True))
     assert ("4 times as long" in said, "less noise" in said) == (longer, True)
     assert not re.search(r"\binf\b|e\+", said)
 
@@ -894,17 +899,17 @@ def test_a_recording_that_is_merely_short_is_asked_for_as_long_as_its_noise_need
     bins = SimpleNamespace(time_s=np.asarray([0.0, LIMITS.short_s / 4.5]))
     problem = SimpleNamespace(bins=bins)
     state = SimpleNamespace(detectable=seen, blind=("delay",), lacks=lacks, problem=problem)
-    told = advised.advice(advice._to_see_more(state), advised.Bench(Scale(), "A"))
+    told = advice_wording.advice(advice._to_see_more(state), advice_wording.Bench(Scale(), "A"))
     assert said in told
     assert told.startswith("Use the model as it is")
 
 
-@pytest.mark.parametrize("name", advised.EXPERIMENTS)
+@pytest.mark.parametrize("name", advice_wording.EXPERIMENTS)
 def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     """A piezo from 20 to 120 V whose second is 2 ms: volts, volts a second, milliseconds; never amperes."""
-    bench = advised.Bench(Scale(low=20.0, reach=100.0, second=0.002), "V")
+    bench = advice_wording.Bench(Scale(low=20.0, reach=100.0, second=0.002), "V")
     figures = {"there": 1.0, "here": 0.5}
-    said = advised.advice(Evidence("tied", figures=figures, names=(name, "delay", "creep")), bench)
+    said = advice_wording.advice(Evidence("tied", figures=figures, names=(name, "delay", "creep")), bench)
     assert " V" in said
     assert " A" not in said
     told = {
@@ -934,14 +939,14 @@ def test_what_is_as_fast_as_the_samples_asks_for_a_faster_recording(kind):
     """Ten hours, every 10 s: creep of 25 s was followed by stops of hours. Our device has one signal only."""
     figures = {"tau": 25.0 / 7700.0, "apart": 10.0 / 7700.0, "faster": 0.6 * 7700.0 / 25.0}
     one = Evidence(kind, figures=figures, names=("holds",))
-    said = advised.advice(one, advised.Bench(Scale(2.0, 6.0, second=7700.0), "V"))
+    said = advice_wording.advice(one, advice_wording.Bench(Scale(2.0, 6.0, second=7700.0), "V"))
     for words in ("about 25 s was found", "samples 10 s apart", "at 0.072 V/s, 0.22 V/s", "every 260 ms"):
         assert words in said, said
     first, slower, _ = said.partition("This recording cannot show everything")
     assert " h " not in first
     assert slower
     assert (kind in ("lacks", "again")) is said.startswith("A time of")
-    assert "A time of" not in advised.advice(one, advised.Bench(Scale(), "A", ours=True))
+    assert "A time of" not in advice_wording.advice(one, advice_wording.Bench(Scale(), "A", ours=True))
 
 
 def _quick(name, *values, dt_s=0.01, length=3000):
@@ -984,8 +989,8 @@ def test_what_is_as_fast_as_the_samples(name, values, tau):
 
 def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     """A range that ends at -0.3321 mA ends at 0 A for a person; large numbers need no exponent."""
-    said = advised.advice(
-        Evidence("lacks", names=("rates",)), advised.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
+    said = advice_wording.advice(
+        Evidence("lacks", names=("rates",)), advice_wording.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
     )
     assert "between 0 A and 1.2 A" in said
     assert "e+" not in said
@@ -993,37 +998,39 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
 
 def test_no_level_is_asked_for_that_the_input_never_had():
     """A dual model may span more than what was recorded: 0 to 1 A of -0.1 to 1.2 A."""
-    bench = advised.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
+    bench = advice_wording.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
     one = Evidence("tied", figures={"there": 1.0, "here": 0.5}, names=("nested loops", "delay", "creep"))
-    said = advised.advice(one, bench)
+    said = advice_wording.advice(one, bench)
     assert "between 0 A and 1 A" in said
 
 
 def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
-    bench = advised.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
-    said = advised.advice(Evidence("lacks", names=("holds",)), bench)
+    bench = advice_wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
+    said = advice_wording.advice(Evidence("lacks", names=("holds",)), bench)
     assert "between 99.95 A and 100.05 A" in said
     assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
 def test_a_fault_beside_an_extension_is_not_told_as_a_step_that_is_missing():
     """`then` extends the model alone, as it was fitted without the fault."""
-    said = advised.advice(Evidence("extend, correct", names=("outliers",)), advised.Bench(Scale(), "A"))
+    said = advice_wording.advice(
+        Evidence("extend, correct", names=("outliers",)), advice_wording.Bench(Scale(), "A")
+    )
     assert "outliers; the extended model was fitted without that, so nothing has to be corrected" in said
 
 
 @pytest.mark.parametrize("kind", ["none", "none, small", "extend", "extend, or late", "extend, correct"])
 def test_what_can_be_done_now_comes_before_what_to_record(kind):
     """`next` asked for a recording, `then` to extend the model: in no order."""
-    bench = advised.Bench(Scale(), "A")
-    now = advised.advice(Evidence(kind, names=("creep",)), bench)
-    both = advised.advice(Evidence(kind, names=("creep", "holds")), bench)
-    assert both.startswith(f"{now} This recording cannot show everything (the input never rests")
+    bench = advice_wording.Bench(Scale(), "A")
+    now = advice_wording.advice(Evidence(kind, names=("creep",)), bench)
+    both = advice_wording.advice(Evidence(kind, names=("creep", "holds")), bench)
+    assert both.startswith(f"{now}\nThis recording cannot show everything (the input never rests")
     assert "record output and input again" in both
 
 
-@pytest.mark.parametrize("kind", list(advised.ADVICE))
+@pytest.mark.parametrize("kind", list(advice_wording.ADVICE))
 @pytest.mark.parametrize("command", ["", "correct", "extend"])
 def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
     """`next` sent to the bench, or to use the model as it is, and `then` to correct the recording."""
@@ -1031,7 +1038,7 @@ def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
     one = Evidence(
         kind, figures={"there": 1, "here": 1, "rest": 1, "matters": 1, "times": 2, "rail": 1}, names=names
     )
-    said = advised.advice(one, advised.Bench(Scale(), "A"), command, ["outliers", "periodic"])
+    said = advice_wording.advice(one, advice_wording.Bench(Scale(), "A"), command, ["outliers", "periodic"])
     if command == "correct":
         assert "pulsetrainer correct" in said
     if kind in ("tied", "tied, no better"):
@@ -1039,10 +1046,12 @@ def test_what_can_be_done_about_the_measurement_is_always_said(kind, command):
         assert ("pulsetrainer extend" in said) is (command == "extend")
         assert ("does not belong in a model" in said) is (command == "correct")
         of_the_device = replace(one, names=(*names[:-1], "viscous"))
-        said = advised.advice(of_the_device, advised.Bench(Scale(), "A"), command, ["periodic"])
+        said = advice_wording.advice(of_the_device, advice_wording.Bench(Scale(), "A"), command, ["periodic"])
         assert "does not belong in a model" not in said
         at_50 = replace(one, figures={**one.figures, "mains": 50.02})
-        assert "50.02 Hz" in advised.advice(at_50, advised.Bench(Scale(), "A"), command, ["periodic"])
+        assert "50.02 Hz" in advice_wording.advice(
+            at_50, advice_wording.Bench(Scale(), "A"), command, ["periodic"]
+        )
 
 
 @pytest.mark.parametrize("kind", ["tied", "tied, no better"])
@@ -1058,7 +1067,9 @@ def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
     """No recording decides between the sensor and the device as surely as a person who knows the sensor."""
     figures = {"there": 1.0, "here": 0.5}
     named = ("heating", *names) if kind == "tied" else names
-    said = advised.advice(Evidence(kind, figures=figures, names=named), advised.Bench(Scale(), "A"))
+    said = advice_wording.advice(
+        Evidence(kind, figures=figures, names=named), advice_wording.Bench(Scale(), "A")
+    )
     assert ("If you know that it is the measurement (offset-drift)" in said) is known
 
 
@@ -1066,7 +1077,7 @@ def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
 def test_a_recording_without_time_may_only_need_its_rate(kind, first):
     """It sent back to the bench, where `import --rate` is enough."""
     timed, untimed = (
-        advised.advice(Evidence(kind, names=names), advised.Bench(Scale(), "A", timed=False))
+        advice_wording.advice(Evidence(kind, names=names), advice_wording.Bench(Scale(), "A", timed=False))
         for names in (("holds",), ("time",))
     )
     assert "--rate HZ" not in timed
@@ -1082,8 +1093,8 @@ def test_two_rates_that_count_as_one_are_not_told_as_one():
 
 def test_what_a_record_lacks_is_asked_for_in_numbers():
     """Rates, stops and length, for a slow bench in millimetres."""
-    bench = advised.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
-    said = advised.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
+    bench = advice_wording.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
+    said = advice_wording.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
     for words in ("0.01 mm/s", "0.16 mm/s", "300 s", "1.8, 0.6, 1.4 and 0.2 mm", "33.3 min or more"):
         assert words in said, said
     assert "between 0 mm and 2 mm" in said
@@ -1219,12 +1230,14 @@ def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(
 def test_advice_to_record_again_says_how():
     """By us: the whole command, up to where the input went; elsewhere: the columns of the table."""
     lacks = Evidence("lacks", names=("holds",))
-    ours = advised.advice(lacks, advised.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
-    assert ours.endswith("pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5.")
-    bench = advised.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
+    ours = advice_wording.advice(
+        lacks, advice_wording.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6))
+    )
+    assert "pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5. Then diagnose" in ours
+    bench = advice_wording.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
     assert (
         "the columns time in s, H in A/m and strain, and read that with pulsetrainer import"
-        in advised.advice(lacks, bench)
+        in advice_wording.advice(lacks, bench)
     )
 
 

@@ -19,7 +19,7 @@ from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.finding import A_FAULT, NOT_ADDED, Estimate, Finding
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.raw import Firing
@@ -1655,7 +1655,7 @@ def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival,
     findings = (replace(_finding("thermal-drift", 80.0), confounded_with=(rival,)),)
     after = repetition.stage(_state(_fit(500.0, "thermal-drift"), findings=findings))
     assert after.repeated.names == (("thermal-drift",) if added else ())
-    assert after.findings[0].doubts == (() if added else (repetition.A_FAULT,))
+    assert after.findings[0].doubts == (() if added else (A_FAULT,))
     assert not after.findings[0].in_doubt
 
 
@@ -1674,7 +1674,7 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     assert [one.found for one in after.findings] == [True, found]
     assert after.repeated.names == (("creep",) if not beside else ())
     # what is in doubt for another reason was never asked whether it repeats
-    assert after.findings[1].doubts == (rivals.MAY_BE_NOTHING, repetition.NOT_ADDED)
+    assert after.findings[1].doubts == (rivals.MAY_BE_NOTHING, NOT_ADDED)
     assert after.current.names == (("creep", "viscous") if found else ("creep",))
     assert after.findings[0].explains_percent == pytest.approx(80.0 if found else 30.0)
 

@@ -524,6 +524,23 @@ def test_stamps_with_a_date_are_counted_from_the_first_sample():
         assert below.get_xlim()[1] < 1.1 * plain.time_s[-1]
 
 
+@pytest.mark.parametrize(
+    ("seconds", "unit", "one"), [(500.0, "s", 1), (1200.0, "min", 60), (1e4, "h", 3600), (3e5, "d", 86400)]
+)
+def test_an_axis_of_time_is_read_in_the_unit_that_fits_its_length(seconds, unit, one):
+    """One of 2.8 hours went to ``1e4 s``; its ticks are round in its unit, on both axes that share it."""
+    run = replace(examples.run(), reference=None)
+    figure = figures.run(replace(run, time_s=np.linspace(0.0, seconds, run.input.size)))
+    FigureCanvasAgg(figure).draw()
+    above, below, _ = figure.axes
+    assert below.get_xlabel() == f"time [{unit}]"
+    ticks = [tick.get_text() for tick in below.get_xticklabels()]
+    np.testing.assert_allclose([one * float(tick.replace("−", "-")) for tick in ticks], below.get_xticks())
+    assert len(ticks) > 3
+    assert max(map(len, ticks)) <= 4
+    assert list(above.get_xticks()) == list(below.get_xticks())
+
+
 def test_the_prediction_of_one_model_fills_its_figure():
     """The right half of the picture was empty."""
     alone = figures.evaluation(Evaluation(models=(examples.model_evaluation(),)))
@@ -616,6 +633,7 @@ def test_the_legend_of_the_coil_lies_above_its_line():
     figure = figures.draw(warm)
     FigureCanvasAgg(figure).draw()
     (axes,) = (one for one in figure.axes if "[K]" in one.get_ylabel())
+    assert axes.get_xlabel() == "time [s]"
     assert axes.get_legend().get_window_extent().y0 > axes.transData.transform((0.0, 15.0))[1]
 
 

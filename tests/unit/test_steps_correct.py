@@ -300,10 +300,11 @@ def test_a_part_that_was_not_diagnosed_stays_as_it_is(clean):
 @pytest.mark.parametrize(("verdict", "goes_on"), [("unknown", True), ("inconclusive", True), ("none", False)])
 def test_what_cannot_be_corrected_is_not_called_sound(verdict, goes_on):
     """Where something is wrong that has no name, the diagnosis says what to do."""
-    known = {"extended": None, "quick": False, "next_experiment": "Record again.", "found": ()}
+    known = {"extended": None, "quick": False, "advice": ["Record again.", "Longer."], "found": ()}
     found = SimpleNamespace(verdict=verdict, **known)
     told = instead(found)
     assert ("Record again." in told) is goes_on
+    assert "Longer." not in told
     assert ("as it is" in told) is not goes_on
 
 

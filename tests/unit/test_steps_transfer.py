@@ -82,7 +82,7 @@ def test_what_one_path_says_of_another():
     _, less = elsewhere(narrow, missed, wide)
     assert less.mean() > 3 * variance.mean()
     assert np.all(variance <= same.variance)
-    np.testing.assert_allclose(same.variance, np.diagonal(same.along(same)))
+    np.testing.assert_allclose(same.variance, np.diagonal(same.covariance_with(same)))
 
 
 def test_a_drive_of_another_model_is_refused_by_the_names_of_both():

@@ -151,6 +151,87 @@ def test_a_name_of_a_program_says_a_unit_without_a_slash(heading, name, unit):
     assert split_unit(heading) == (name, unit)
 
 
+QUOTIENTS = "l/h m3/h L/min ml/min mm/s km/h m/s^2 m/s² K/min U/min rad/s A/m kA/m kV/mm N/mm2 kN/m2 mV/V"
+
+
+@given(
+    name=st.sampled_from(["Durchfluss", "x", "H", "T", "coil I", "Spannung U", "x/y", "A/B", "force_2"]),
+    written=st.sampled_from(["{} [{}]", "{}({})", "{}_{}", "{}/{}", "{} / {}", "{} {}"]),
+    unit=st.sampled_from([*QUOTIENTS.split(), "mbar", "kN", "mm", "ms", "degC"]),
+)
+def test_a_unit_is_read_back_behind_a_blank_too(name, written, unit):
+    """``Durchfluss l/h`` was a ``Durchfluss l`` in hours."""
+    assert split_unit(written.format(name, unit)) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        *("s/mm", "F/kN", "T/°C", "H/A/m", "H/Oe", "dT/K", "V/ml", "Tm/K", "M/Nm"),
+        *("F / N", "A / s", "I / A", "1/N", "min/N", "in/bar"),
+    ],
+)
+def test_the_symbol_of_a_quantity_over_its_own_unit_is_no_unit(written):
+    """``Weg s/mm`` is a path s in mm, although both are units."""
+    symbol, unit = written.split("/", 1)
+    assert split_unit(f"x {written}") == (f"x {symbol.strip()}", unit.strip())
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("x l/h", "x", "l/h"),
+        ("x mm / s", "x", "mm / s"),
+        ("x 1/min", "x", "1/min"),
+        ("x V/V", "x", "V/V"),
+        ("x H/m", "x", "H/m"),
+        ("x: m/s", "x", "m/s"),
+        ("x m3/hour", "x", "m3/h"),
+        ("x N/mm2 abs", "x", "N/mm2"),
+        ("force/current N/A", "force/current", "N/A"),
+        ("Newtons per mm", "Newtons per mm", ""),
+        ("Kraft min", "Kraft min", ""),
+        ("coil A", "coil A", ""),
+    ],
+)
+def test_the_reading_with_known_units_on_both_sides_of_the_slash_is_taken(heading, name, unit):
+    """Behind a blank alone a single letter is rather a name."""
+    assert split_unit(heading) == (name, unit)
+
+
+@pytest.mark.parametrize("written", ["PWM [-]", "PWM (-)", "PWM [–]", "PWM [1]", "PWM []", "PWM / -"])
+def test_a_dash_says_that_there_is_no_unit(written):
+    """It was refused as an unknown one."""
+    name, unit = split_unit(written)
+    assert (name, symbol_of(unit) or "1") == ("PWM", "1")
+
+
+@pytest.mark.parametrize(
+    ("written", "unit"),
+    [
+        ("mbar abs", "mbar"),
+        ("mbar(abs)", "mbar"),
+        ("V rms", "V"),
+        ("Vrms", "V"),
+        ("A eff.", "A"),
+        ("volts RMS", "V"),
+        ("rms", "rms"),
+        ("dac", "dac"),
+        ("mbar foo", "mbar foo"),
+    ],
+)
+def test_how_a_quantity_is_measured_is_no_part_of_its_unit(written, unit):
+    """Of ``mbar abs`` the command said "did you mean 'bar'"."""
+    assert symbol_of(written) == unit
+
+
+@pytest.mark.parametrize(("wrong", "unit"), [("mbar foo", "mbar"), ("mBar", "mbar"), ("degrees", "deg")])
+def test_the_unit_that_is_offered_first_has_the_same_prefix(wrong, unit):
+    """Another one is off by a factor of a thousand."""
+    with raises(DataError, "a unit like it", argument="output unit", wrong=wrong, unit=unit):
+        check_unit(wrong, "output unit")
+
+
 @pytest.mark.parametrize(
     ("heading", "name", "unit"),
     [(one, one, "V") for one in ("V(in)", "V(n001)", "v(out)", "V(g)", "V(a,b)", "V(x1:m3)", "V(1)")]

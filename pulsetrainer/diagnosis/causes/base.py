@@ -50,7 +50,7 @@ class Quantity:
     low: float
     high: float
     small: float  # a step that matters little: for differences
-    meaning: str = ""  # of what it is, in words; {input} and {output} are what was measured
+    meaning: str = ""  # what it is, in words; {input} and {output} are what was measured
 
 
 @dataclass
@@ -154,7 +154,7 @@ class Taken:
 
 
 class Cause:
-    """A reason why a static Preisach model is wrong, with the operator that repairs it."""
+    """A reason why a static Preisach model is wrong, with the operator that adds its effect."""
 
     id: ClassVar[str]
     title: ClassVar[str]  # in words a technician understands; {input} and {output} are what was measured
@@ -168,7 +168,7 @@ class Cause:
     parameters: ClassVar[tuple[Quantity, ...]] = ()
     number: ClassVar[str] = ""  # the name in a model of a number that its formula leaves open ...
     meant: ClassVar[str] = ""  # ... and what it is, in words as those of a quantity
-    size: ClassVar[str] = ""  # of what the size is that its gate tells, in words as those of a quantity
+    size: ClassVar[str] = ""  # what the size is that its gate tells, in words as those of a quantity
     strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
     texts: ClassVar[Mapping[str, str]] = {}  # what its gate says, by the kind of firing, figures in braces
     # how it is sought
@@ -188,9 +188,9 @@ class Cause:
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
-    imitates: ClassVar[bool] = False  # whatever a device does as it moves
+    imitates: ClassVar[bool] = False  # fits almost anything that happens while the device moves
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
-    moves_zero: bool = False  # as well as the gain: so may what settles and looks like it
+    moves_zero: bool = False  # as well as the gain; then wear that looks like it may do both, too
     sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
     line: ClassVar[bool] = False  # of the spectrum: what is like no error of a model where it is strong
 
@@ -239,7 +239,7 @@ class Cause:
         return polarity if any("{y}" in q.unit and q.low < 0 for q in own) else 1
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try; the columns of a block are fitted together.
+        """Blocks of parameter values to try; what they add is fitted together, a column for each of a block.
 
         ``residual`` holds that of each record (n,) at its own rate, zero where samples have no weight.
         """
@@ -251,7 +251,7 @@ class Cause:
         return self
 
     def at(self, moment: float, frames: Sequence[Frame]) -> list[Values]:
-        """Return a block with each strength of a sudden cause at one moment."""
+        """Return a block for a change at one moment: of the offset alone, of the gain alone."""
         raise NotImplementedError
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
@@ -268,7 +268,7 @@ class Cause:
         return None
 
     def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
-        """Return whether so small a cause differs from what the moments of sampling do."""
+        """Return whether it can be told from an error in the times of the samples."""
         return True
 
     def stands_out(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> bool:

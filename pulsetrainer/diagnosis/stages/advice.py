@@ -7,8 +7,8 @@ The first of these that applies is the advice:
 - If the device was still settling when the records began, it must rest first.
 - If no verdict is reached and what is left is the same in two records of one input, another kind of model is
   needed. If it differs between them, or follows time alone (also as a drift of another course), device and
-  sensor must be kept steady. If the
-  weights may hide a fault of the measurement, a record without it is needed.
+  sensor must be kept steady. If the weights may hide a fault of the measurement, a record without it is
+  needed.
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
@@ -17,6 +17,7 @@ The first of these that applies is the advice:
   (`correct`), a property of the device goes into the model (`extend`).
 
 What the records lack comes after what can be done with them, or first if nothing can be done with them.
+The words are in ``advice_wording``.
 """
 
 from __future__ import annotations

@@ -35,15 +35,15 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.finding import A_FAULT, MAY_BE_WEAR, NOT_ADDED, Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.held_out import repeated
-from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, squares_moved
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, SETTLES, squares_moved
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 SLOW = ("slow memory", "slow gain", "drift")  # families of what a drift may mend
-DOUBT, NOT_ADDED, A_FAULT = "does not repeat", "not added", "may be a fault"
+DOUBT = "does not repeat"
 
 
 def stage(state: State) -> State:

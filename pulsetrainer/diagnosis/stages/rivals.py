@@ -42,7 +42,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
-from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
+from pulsetrainer.diagnosis.finding import AT_BOUND, MAY_BE_WEAR, Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.noise import doubt
@@ -51,8 +51,8 @@ from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
-OWN_ERROR, STRONGEST, AT_BOUND, LEAVES_MORE = "own error", "strength at bound", "at bound", "leaves more"
-MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "settles", "in step"
+OWN_ERROR, STRONGEST, LEAVES_MORE = "own error", "strength at bound", "leaves more"
+MAY_BE_NOTHING, SETTLES, IN_STEP = "spans zero", "settles", "in step"
 IMITATES = "imitates"
 
 

@@ -18,8 +18,8 @@ from pulsetrainer.diagnosis.wording import LACKS, figure, joined, listed
 # first) or all are (whichever), or which the model was extended by; of a fault that can be taken out (also);
 # of records without time (rate); of what is found at the fast end of what a record shows (faster)
 BESIDE = sentences("""\
-again: record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose it
-    together with these recordings, with the same model. {command}
+again: record {output} and {input} again, the {input} between {low} and {high}: {missing}. {command}
+    Then diagnose the new recording together with these, with the same model.
 keep: Use the model as it is: nothing that was found calls for another one.
 known: If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up),
     record the same again, and identify the model from that.
@@ -37,8 +37,8 @@ one rate: At one rate each of them is only a shape of the loop, which the device
 rate: If the samples were taken at a constant rate, no new recording is needed: read the table again with
     pulsetrainer import --rate HZ.
 faster: A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart).
-    To know what it is, record {experiment}{often}{lasting}{so_fast}. Then diagnose it together with
-    these recordings, with the same model. {command}
+    To know what it is, record {experiment}{often}{lasting}{so_fast}. {command} Then diagnose
+    the new recording together with these, with the same model.
 later: This recording cannot show everything ({lacked}). If that matters to you, {again}
 ours: The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} -o
     diagnostic-2.h5.
@@ -51,7 +51,7 @@ ADVICE: Mapping[str, str] = {
 tied, quick: Run the full diagnosis: a quick screen cannot distinguish between {names}.
 tied: To tell {names} apart, record {experiment}{often}{lasting}{so_fast}. There the two most similar causes
     differ by {there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ
-    by {here:.2g} %. Then diagnose it together with these recordings, with the same model. {command}
+    by {here:.2g} %. {command} Then diagnose the new recording together with these, with the same model.
 tied, no better: We know of no kind of recording that would tell {names} apart much better than this one, on
     which they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of the
     same kind would help: four times as long halves the noise.
@@ -245,7 +245,7 @@ def _set(value: float, to_whole: Callable[[float], int] = round) -> float:
 
 
 def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str] = ()) -> str:
-    """Return what to measure next, as a sentence, in numbers of the bench.
+    """Return what to measure next, in numbers of the bench: one paragraph, or two with a line break between.
 
     ``command`` is what goes on with the recordings as they are, and ``removed`` what `correct` takes out.
     """
@@ -303,5 +303,6 @@ def _with_what_lacks(told: str, lacked: Sequence[str]) -> str:
     """Return advice with what to do about what the records lack, where it does not say so itself."""
     rate = [BESIDE["rate"]] if "time" in lacked else []
     if lacked and "{missing}" not in told:
-        return " ".join([told, BESIDE["later"].replace("{again}", BESIDE["again"]), *rate])
+        later = BESIDE["later"].replace("{again}", BESIDE["again"])
+        return f"{told}\n{' '.join([later, *rate])}"  # a paragraph of its own: it may not matter
     return " ".join([*rate, told])
