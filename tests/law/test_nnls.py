@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy import optimize
 
@@ -67,8 +67,10 @@ def test_same_minimiser_as_scipy_where_there_is_one(problem):
     if matrix.shape[0] < matrix.shape[1] or size[-1] < 1e-3 * size[0]:
         matrix = np.vstack((matrix, size[0] * np.eye(matrix.shape[1])))
         right = np.append(right, np.zeros(matrix.shape[1]))
-    expected, _ = optimize.nnls(matrix, right, maxiter=10_000)
+    expected, norm = optimize.nnls(matrix, right, maxiter=10_000)
     found = nnls.solve(matrix.T @ matrix, matrix.T @ right).x
+    # once in some ten thousand problems scipy 1.17 ends where the residual is larger than ours
+    assume(norm <= np.linalg.norm(matrix @ found - right) * (1.0 + 1e-9))
     assert found == pytest.approx(expected, rel=0, abs=1e-8 * np.abs(expected).max() + 1e-300)
 
 
