@@ -129,6 +129,7 @@ MESSAGES = {
     "has no time": Message("no time", ""),
     "does not repeat": Message("does not repeat", "diagnose"),
     "another model": Message("is not the model", "pulsetrainer diagnose"),
+    "nothing to take out": Message("neither a diagnosis nor a delay", "`diagnosis`"),
     "delay too long": Message("is only", "seconds", expected="{length}", got="a delay of {given}"),
     "another kind of device": Message("takes", "captured on the device", "the model {file}", "(A and N)"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),

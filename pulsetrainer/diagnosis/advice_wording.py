@@ -88,8 +88,9 @@ far too noisy: {keep} These recordings could not have shown {names} as small as 
 inconclusive: {keep} These recordings could not have shown {names} of {matters:.2g} % of the span. If that
     matters to you, {again}
 extend, or late: Is the recorder late, or the device? The two look exactly alike. If it is the device, extend
-    the model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which takes
-    it out. Then compare both models on another recording, one that was not fitted: pulsetrainer evaluate.
+    the model with what was found; if it is the recorder, take the delay out of each recording (pulsetrainer
+    correct RUN.h5 --delay SECONDS -o OUT.h5), and identify the model again. Then compare both models on
+    another recording, one that was not fitted: pulsetrainer evaluate.
 extend: Extend the model with what was found, then compare both models on another recording, one that was not
     fitted: pulsetrainer evaluate. If you have that recording already, give it to extend (--verify): only what
     holds there too is then added.

@@ -17,10 +17,13 @@ from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import named
 
+_ROUNDING = 1e-6  # of a time step
 _DELAY = "delay"  # told by the caller: no record tells a recorder's from the device's
 
 
-def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequence[str] = ()) -> Run:
+def correct(
+    run: Run, diagnosis: Diagnosis | None = None, *, delay_s: float = 0.0, names: Sequence[str] = ()
+) -> Run:
     """Take out of a run's output those faults of the measurement that a diagnosis of it found.
 
         y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d)
@@ -32,6 +35,8 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
 
     Parameters
     ----------
+    diagnosis
+        None: only the delay is taken out.
     delay_s
         Constant delay of the output's recorder, s, if there is one: a diagnosis cannot tell it from a delay
         of the device.
@@ -41,7 +46,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     Raises
     ------
     UsageError
-        The delay is no finite number, or below 0.
+        The delay is no finite number, or below 0; or there is neither a diagnosis nor a delay.
     DataError
         The diagnosis is of another run, found nothing beyond doubt that can be corrected, or there is a
         delay and the run has no time or is shorter.
@@ -62,6 +67,8 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
             f"`delay` must be a finite number, 0 or more, got {delay_s:g}", hint="give it in seconds: 0.001"
         )
     run_name, diagnosis_name = named(names, ("the run", "the diagnosis"))
+    if diagnosis is None:
+        return _without_delay(run, delay_s, run_name)
     known = {one.fingerprint: k for k, one in enumerate(diagnosis.records)}
     parts = [(where, run.cut(where)) for where in run.slices]
     if not any(part.fingerprint in known for _, part in parts):
@@ -70,19 +77,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
             hint="give the run that was diagnosed (pulsetrainer show DIAGNOSIS.h5 names it), or diagnose "
             "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
-    if delay_s and run.dt_s is None:
-        raise DataError(
-            f"{run_name} has no time, so no delay can be taken out of it",
-            hint="import it again with `time` COLUMN or `rate_Hz` HZ",
-        )
-    for _, part in parts:
-        length_s = (part.output.size - 1) * (run.dt_s or 0.0)
-        if delay_s >= length_s > 0.0 and part.fingerprint in known:
-            raise DataError(
-                f"a delay of {delay_s:g} s was given, but {run_name} is only {length_s:g} s long"
-                + ("" if len(parts) == 1 else " in one of its parts"),
-                hint="give the delay of the output's recorder in seconds",
-            )
+    _check_delay(run, delay_s, [part for _, part in parts if part.fingerprint in known], run_name)
     faults = _faults(diagnosis)
     if not faults and not delay_s:
         raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))
@@ -95,7 +90,46 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
             output[where] = wild.repaired(restored, lost)
             masked[where] |= lost
     ids = [*([_DELAY] if delay_s else []), *(cause.id for cause, _ in faults)]
-    return replace(run, output=output, masked=masked if masked.any() else None, corrected=tuple(ids))
+    taken_out = tuple(dict.fromkeys((*run.corrected, *ids)))
+    return replace(run, output=output, masked=masked if masked.any() else None, corrected=taken_out)
+
+
+def _check_delay(run: Run, delay_s: float, parts: Sequence[Run], name: str) -> None:
+    """Raise DataError where there is a delay, but no time, or a part that is shorter."""
+    if delay_s and run.dt_s is None:
+        raise DataError(
+            f"{name} has no time, so no delay can be taken out of it",
+            hint="import it again with `time` COLUMN or `rate_Hz` HZ",
+        )
+    for part in parts:
+        length_s = (part.output.size - 1) * (run.dt_s or 0.0)
+        if delay_s >= length_s > 0.0:
+            raise DataError(
+                f"a delay of {delay_s:g} s was given, but {name} is only {length_s:g} s long"
+                + ("" if len(run.slices) == 1 else " in one of its parts"),
+                hint="give the delay of the output's recorder in seconds",
+            )
+
+
+def _without_delay(run: Run, delay_s: float, name: str) -> Run:
+    """Return the run with its output earlier by a known delay; the end of each part is masked."""
+    if not delay_s:
+        raise UsageError(
+            "there is neither a diagnosis nor a delay, so it is not known what to take out",
+            hint="give the `diagnosis` of the run, or the `delay` of its recorder in seconds",
+        )
+    _check_delay(run, delay_s, run.parts(), name)
+    output, masked = run.output.copy(), ~run.counts
+    assert run.time_s is not None
+    for where in run.slices:
+        time_s, y = run.time_s[where], run.output[where]
+        good = np.isfinite(y)
+        lost = time_s + delay_s > time_s[good][-1] + _ROUNDING * (run.dt_s or 0.0)
+        output[where] = wild.repaired(np.interp(time_s + delay_s, time_s[good], y[good]), lost)
+        masked[where] |= lost
+    return replace(
+        run, output=output, masked=masked, corrected=tuple(dict.fromkeys((*run.corrected, _DELAY)))
+    )
 
 
 def _faults(diagnosis: Diagnosis) -> list[tuple[Cause, Values]]:

@@ -162,6 +162,29 @@ def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(
     np.testing.assert_array_equal(done.output[~done.masked], cut.output[~done.masked])
 
 
+def test_a_delay_that_is_known_needs_no_diagnosis(clean):
+    """The recorder's: taken out of two parts, each of whose ends is lost; nothing else is touched."""
+    late = 7
+    seam = np.arange(clean.input.size) == 3000
+    moved = np.concatenate(
+        [np.concatenate((part[:1].repeat(late), part[:-late])) for part in np.split(clean.output, [3000])]
+    )
+    done = pt.correct(replace(clean, output=moved, seam=seam), delay_s=late / RATE_HZ)
+    lost = np.isin(np.arange(moved.size), [*range(3000 - late, 3000), *range(moved.size - late, moved.size)])
+    np.testing.assert_array_equal(done.masked, lost)
+    np.testing.assert_allclose(done.output[~lost], clean.output[~lost], atol=1e-9)
+    assert done.corrected == ("delay",)
+    assert pt.correct(done, delay_s=0.01).corrected == ("delay",)
+
+
+def test_neither_a_diagnosis_nor_a_delay_takes_nothing_out(clean):
+    """Nobody says what is wrong with the run."""
+    with raises(UsageError, "nothing to take out"):
+        pt.correct(clean)
+    with raises(DataError, "delay too long", length="", given="1e+09"):
+        pt.correct(clean, delay_s=1e9)
+
+
 def test_without_noise_no_fit_tells_what_lies_beyond_a_rail(clean):
     """Every fit leaves more than nothing; a division by the noise warned of it."""
     record, up = Record(clean.input, clean.output, np.ones(clean.input.size)), clean.output > 0.75 * SPAN
