@@ -86,6 +86,15 @@ _OF_A_SYMBOL = re.compile(
     r"d?[dhls]/.?m$|d?F/.?N$|d?T\w?/(?:K|°?C|degC)$|H/(?!m$)|m\d?/.?g$|d?V/(?:.?[lL]|.?m\^?[3³])$|L/.?H$|C/.?F$"
     r"|W/.?J$|P\w?/.?W$|M\w?/.?Nm$|p\w?/(?:.?Pa|m?bar)$|min/|in/(?!s$|min$)|1/(?!s$|min$|h$)"
 )
+# quantities behind which a single letter is their unit: "Force N", but not "coil A"
+_OF_A_LETTER = {
+    unit: [[word] for word in words.split()]
+    for unit, words in {
+        "N": "force kraft load last", "V": "voltage spannung", "A": "current strom",
+        "K": "temperature temperatur", "s": "time zeit t", "h": "time zeit t",
+        "m": "position displacement stroke weg hub", "W": "power leistung",
+    }.items()
+}  # fmt: skip
 _MARK = re.compile(r"\s*[/,]\s*|\s+in\s+|\s+(?=[%‰°]\w?$)")
 _WORD_BEHIND = re.compile(r"^(?P<name>.*\S)(?<! per)\s+(?P<unit>\S{2,})$")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
@@ -185,8 +194,10 @@ def _behind_a_mark(heading: str) -> tuple[str, str] | None:
         if name and name[-1] not in "/," and unit != "1" and is_unit(symbol_of(unit)):
             return _quotient(name, mark.group(), unit) or (name, unit)
     found = _WORD_BEHIND.match(heading)
-    known = found and found["unit"] in _BEHIND_A_NAME - _NO_UNIT_ALONE
-    return (found["name"], found["unit"]) if found and known else None
+    if found and found["unit"] in _BEHIND_A_NAME - _NO_UNIT_ALONE:
+        return found["name"], found["unit"]
+    name, _, letter = heading.rpartition(" ")
+    return (name.rstrip(), letter) if name.lower().split()[-1:] in _OF_A_LETTER.get(letter, ()) else None
 
 
 def _quotient(name: str, mark: str, below: str) -> tuple[str, str] | None:

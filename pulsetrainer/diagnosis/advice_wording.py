@@ -18,8 +18,8 @@ from pulsetrainer.diagnosis.wording import LACKS, figure, joined, listed
 # first) or all are (whichever), or which the model was extended by; of a fault that can be taken out (also);
 # of records without time (rate); of what is found at the fast end of what a record shows (faster)
 BESIDE = sentences("""\
-again: record {output} and {input} again, the {input} between {low} and {high}: {missing}. {command}
-    Then diagnose the new recording together with these, with the same model.
+again: record {output} and {input} again: first a loop of the {input} from {low} to {high} and back, then
+    {missing}. {command} Then diagnose the new recording together with these, with the same model.
 keep: Use the model as it is: nothing that was found calls for another one.
 known: If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up),
     record the same again, and identify the model from that.

@@ -992,7 +992,7 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     said = advice_wording.advice(
         Evidence("lacks", names=("rates",)), advice_wording.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
     )
-    assert "between 0 A and 1.2 A" in said
+    assert "from 0 A to 1.2 A" in said
     assert "e+" not in said
 
 
@@ -1001,14 +1001,14 @@ def test_no_level_is_asked_for_that_the_input_never_had():
     bench = advice_wording.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
     one = Evidence("tied", figures={"there": 1.0, "here": 0.5}, names=("nested loops", "delay", "creep"))
     said = advice_wording.advice(one, bench)
-    assert "between 0 A and 1 A" in said
+    assert "from 0 A to 1 A" in said
 
 
 def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
     bench = advice_wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
     said = advice_wording.advice(Evidence("lacks", names=("holds",)), bench)
-    assert "between 99.95 A and 100.05 A" in said
+    assert "from 99.95 A to 100.05 A" in said
     assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
@@ -1097,7 +1097,7 @@ def test_what_a_record_lacks_is_asked_for_in_numbers():
     said = advice_wording.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
     for words in ("0.01 mm/s", "0.16 mm/s", "300 s", "1.8, 0.6, 1.4 and 0.2 mm", "33.3 min or more"):
         assert words in said, said
-    assert "between 0 mm and 2 mm" in said
+    assert "from 0 mm to 2 mm" in said
     least = f"{100.0 * LIMITS.hold_s:.0f} s"  # what counts as a hold on a bench whose second is 100 s
     evidence = wording.sentence(Evidence("lacks", names=("holds", "length")), bench.numbers())
     assert least in evidence

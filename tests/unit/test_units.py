@@ -192,6 +192,11 @@ def test_the_symbol_of_a_quantity_over_its_own_unit_is_no_unit(written):
         ("Newtons per mm", "Newtons per mm", ""),
         ("Kraft min", "Kraft min", ""),
         ("coil A", "coil A", ""),
+        ("Force N", "Force", "N"),
+        ("supply voltage V", "supply voltage", "V"),
+        ("t s", "t", "s"),
+        ("Kanal V", "Kanal V", ""),
+        (" N", " N", ""),
     ],
 )
 def test_the_reading_with_known_units_on_both_sides_of_the_slash_is_taken(heading, name, unit):
