@@ -1001,7 +1001,7 @@ def test_no_level_is_asked_for_that_the_input_never_had():
     bench = advice_wording.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
     one = Evidence("tied", figures={"there": 1.0, "here": 0.5}, names=("nested loops", "delay", "creep"))
     said = advice_wording.advice(one, bench)
-    assert "from 0 A to 1 A" in said
+    assert "between 0 A and 1 A" in said
 
 
 def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
