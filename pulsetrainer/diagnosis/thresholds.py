@@ -275,6 +275,8 @@ class Thresholds:
     no_turn: float = 0.01  # of the range of the input: half the size of the smallest reversal that is a turn
     worth_recording: float = 1.5  # times the difference seen here: an experiment below is not advised
     first_stroke_most: float = 0.25  # of a record: a longer piece is not left out as a first stroke
+    first_stroke_missed: float = 3.0  # times what is left of all that follows: more is a first stroke apart
+    first_stroke_least: int = 8  # averages: of fewer, noise may be so much larger than that of the others
     first_stroke_share: float = 0.5  # of what causes explain: with more in first strokes, these go
 
     # Words

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from pulsetrainer.core.initial_state import (
     record_of,
     second_stroke,
 )
+from pulsetrainer.diagnosis.stages import first_stroke
 
 DT_S = 0.02
 RADII = np.linspace(0.1, 1.5, 8)
@@ -258,3 +260,17 @@ def test_it_is_no_error_of_a_model():
     found = pt.evaluate(fresh, pt.identify(cycled, levels=24))
     assert found.models[0].rms_percent < 1.5 * pt.evaluate(cycled, found.model).models[0].rms_percent
     assert [note for note in found.notes if "first stroke" in note]
+
+
+@pytest.mark.parametrize(
+    ("times", "until", "apart"), [(3.1, 16, True), (2.9, 16, False), (3.1, 14, False), (3.1, 40, False)]
+)
+def test_a_first_stroke_that_the_model_misses_far_more_than_the_rest_is_apart(times, until, apart):
+    """Two samples to an average: of fewer than eight averages noise may be as large, and some must follow."""
+    number = np.arange(40) // 2
+    residual = np.where(np.arange(20) < until // 2, times, 1.0) * np.resize([1.0, -1.0], 20)
+    state = SimpleNamespace(
+        problem=SimpleNamespace(bins=SimpleNamespace(number=[number])),
+        current=SimpleNamespace(residual=residual),
+    )
+    assert first_stroke._misses(state, 0, until) is apart

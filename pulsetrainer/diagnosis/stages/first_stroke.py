@@ -5,7 +5,10 @@ anything is fitted. If the device creeps, rings or runs in, the later strokes di
 first one. So it is looked for once more in the output less what the causes add. If it stands out there, it is
 left out, and the search begins again.
 
-If it does not, the search is tried without it in two cases: where more than noise is left, since the first
+A first stroke of which the model misses three times as much as of all that follows is left out as well, as in
+`evaluate`: in a record with a single stroke from that end there is nothing to compare it with.
+
+If neither tells, the search is tried without it in two cases: where more than noise is left, since the first
 stroke may have kept the causes from being found; and where more than half of what the causes explain lies
 within first strokes. There, one that could not be compared with others looks like heat, or like a drift of
 the zero that ends with it. The result counts if it leaves only noise.
@@ -19,6 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.initial_state import known_from, left_out_words, second_stroke
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.diagnosis.stages import baseline, raw_data, whole_search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -34,14 +38,26 @@ def stage(state: State) -> State:
     inputs = [even.input for even in state.problem.records]
     apart = [known_from(u, 0.0, 1.0, y) for u, y in zip(inputs, static, strict=True)]
     known = [known_from(u, 0.0, 1.0) for u in inputs]
-    again = _without(state, [a if a > k else 0 for a, k in zip(apart, known, strict=True)])
+    second = [second_stroke(u, 0.0, 1.0) for u in inputs]
+    missed = [until if _misses(state, k, until) else 0 for k, until in enumerate(second)]
+    counts = [a if a > k else m for a, k, m in zip(apart, known, missed, strict=True)]
+    again = _without(state, counts)
     if again is not None:
         return again
-    second = [second_stroke(u, 0.0, 1.0) for u in inputs]
     if state.jagged or (state.is_whole(state.current) and not _explains_only(state, second)):
         return state
     again = _without(state, second)
     return again if again is not None and again.is_whole(again.current) else state
+
+
+def _misses(state: State, record: int, until: int) -> bool:
+    """Whether what the model leaves is far larger in the first ``until`` samples of a record than later."""
+    number = state.problem.bins.number[record]
+    first, later = (np.unique(part[part >= 0]) for part in (number[:until], number[until:]))
+    if first.size < LIMITS.first_stroke_least or not later.size:
+        return False
+    left = state.current.residual
+    return root_mean_square(left[first]) > LIMITS.first_stroke_missed * root_mean_square(left[later])
 
 
 def _explains_only(state: State, second: Sequence[int]) -> bool:
