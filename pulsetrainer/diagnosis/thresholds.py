@@ -250,7 +250,7 @@ class Thresholds:
     speed_window: int = 9  # samples of the parabola whose slope is the velocity
     poor: float = 0.05  # of the span: a model that leaves less than this is not of the wrong kind
     better: float = 0.75  # of what the model leaves: a function of the velocity must leave less than this
-    kind_share: float = 0.25  # of what a function of the velocity leaves: causes leaving less are no repair
+    kind_share: float = 0.1  # of what a function of the velocity leaves: causes leaving less are no repair
     speed_matters: float = 0.6  # of what the direction alone leaves: below it the force is viscous
 
     # Where the residual is

@@ -60,15 +60,15 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
     if path.exists() and not overwrite:
         raise ExistsError(path)
-    if path.exists() and not os.access(path, os.W_OK):
-        raise DataError(
-            f"the output {path} is write-protected",
-            hint=f"name another file, or allow it: chmod u+rw {shlex.quote(str(path))}",
-        )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(
             f"the output {path} cannot be written: the folder {folder} is not writable",
             hint="write to another folder, or change its permissions",
+        )
+    if path.exists() and not os.access(path, os.W_OK):
+        raise DataError(
+            f"the output {path} is write-protected",
+            hint=f"name another file, or allow it: chmod u+rw {shlex.quote(str(path))}",
         )
 
 

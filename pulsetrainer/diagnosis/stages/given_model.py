@@ -6,7 +6,7 @@ records.
 - If the output, of all records or of one, falls where the model rises, the polarity is reversed:
   `condition-change`, and all else is withdrawn.
 - If a mere function of the velocity describes the output much better, the model is of the wrong kind, and
-  causes sought on top of it are withdrawn, unless they leave less than a quarter of what that function
+  causes sought on top of it are withdrawn, unless they leave less than a tenth of what that function
   leaves: a long lag at a high rate follows the velocity as well. If the speed matters and not only the
   direction, the force is `viscous`; otherwise the cause is `unknown`.
 - If the model as given leaves less than the best model of the search, the search found only faults of its own
