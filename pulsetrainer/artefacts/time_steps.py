@@ -17,7 +17,7 @@ _LONG = 5.0
 _FAR = 0.01  # of the input's range: an extreme that is missed by less hardly changes what is remembered
 _SECOND = np.sqrt(6.0)  # second differences of white noise have six times its variance
 _LOOKED_AT = 1_000_000  # steps for their median
-_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
+BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +67,8 @@ def behind_turns(time_s: FloatArray, inputs: FloatArray) -> list[int]:
     low, high = float(np.fmin.reduce(inputs)), float(np.fmax.reduce(inputs))
     far = _FAR * (high - low)
     doubtful = []
-    for k in range(0, time_s.size - 1, _BLOCK):
-        for at in (k + 1 + np.flatnonzero(np.diff(time_s[k : k + _BLOCK + 1]) > longest)).tolist():
+    for k in range(0, time_s.size - 1, BLOCK):
+        for at in (k + 1 + np.flatnonzero(np.diff(time_s[k : k + BLOCK + 1]) > longest)).tolist():
             length = time_s[at] - time_s[at - 1]
             before = inputs[np.searchsorted(time_s, time_s[at - 1] - length) : at]
             behind = inputs[at : np.searchsorted(time_s, time_s[at] + length, side="right")]
@@ -96,8 +96,8 @@ def steps_of(time_s: FloatArray) -> Steps:
     every = -(-(time_s.size - 1) // _LOOKED_AT)
     median = float(np.median(time_s[1::every] - time_s[:-1:every]))
     shortest, longest, gaps, longest_gap = np.inf, -np.inf, 0, 0.0
-    for k in range(0, time_s.size - 1, _BLOCK):
-        step = np.diff(time_s[k : k + _BLOCK + 1])
+    for k in range(0, time_s.size - 1, BLOCK):
+        step = np.diff(time_s[k : k + BLOCK + 1])
         is_gap = step > GAP * median
         shortest = min(shortest, float(step.min()))
         longest = max(longest, float(step[~is_gap].max(initial=-np.inf)))

@@ -9,7 +9,9 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.next_step import with_files
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.errors import DataError
 from pulsetrainer.files.input_file import likely_kind
 
 
@@ -37,10 +39,14 @@ def extend(
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
         plain = job.load(model, pt.Model)
-        made_from = map(Path, store.read_header(diagnosis).provenance.inputs)
-        context.params["runs"] = [path for path in made_from if likely_kind(path) == "run"]  # for hints
         other = None if verify is None else job.load(verify, pt.Run)
-        extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))
+        try:
+            extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))
+        except DataError as error:
+            made_from = map(Path, store.read_header(diagnosis).provenance.inputs)
+            runs = [path for path in made_from if likely_kind(path) == "run"]
+            error.hint = with_files(error.hint, {"runs": runs})
+            raise
         added = [one.cause for one in extended.extensions]
         proof = () if other is None else pt.evaluate(other, [plain, extended]).models
         job.save(out, extended, f"Model extended by {', '.join(added)}")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 K = TypeVar("K")
 # what is no parameter of the work: files have digests, a port may hold what no file may know
-_NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html", "runs"}
+_NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html"}
 
 
 class Job:

@@ -44,7 +44,7 @@ def check_ending(path: Path, context: typer.Context) -> None:
 
 
 def _check_text(path: Path, what: str, right: str, then: str) -> None:
-    """Refuse the ending of another format: a browser goes by it, and so does who looks for settings."""
+    """Refuse the ending of another format: by it a browser, or a person, knows the file."""
     ending = path.suffix.lower()
     if is_no_file(path):
         return

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
-from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_dialect import cell_at, column_words
@@ -35,7 +35,6 @@ _SLOW_S, _MANY = 0.2, 100  # a step of so much is rare in many rows, and usual f
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
-_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
 
 class Time(NamedTuple):
@@ -238,7 +237,7 @@ def _just_counts(values: FloatArray) -> bool:
     """Whether a column is 0, 1, 2, or 1, 2, 3, wherever something stands in it."""
     if values.size < _COUNTED or values[0] not in (0.0, 1.0):
         return False
-    parts = ((k, values[k : k + _BLOCK]) for k in range(0, values.size, _BLOCK))
+    parts = ((k, values[k : k + BLOCK]) for k in range(0, values.size, BLOCK))
     return all(
         bool(np.all((part == values[0] + np.arange(k, k + part.size)) | np.isnan(part))) for k, part in parts
     )

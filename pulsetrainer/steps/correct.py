@@ -124,6 +124,8 @@ def _without_delay(run: Run, delay_s: float, name: str) -> Run:
     for where in run.slices:
         time_s, y = run.time_s[where], run.output[where]
         good = np.isfinite(y)
+        if not good.any():
+            continue
         lost = time_s + delay_s > time_s[good][-1] + _ROUNDING * (run.dt_s or 0.0)
         output[where] = wild.repaired(np.interp(time_s + delay_s, time_s[good], y[good]), lost)
         masked[where] |= lost

@@ -27,6 +27,7 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.diagnosis.question import input_range, range_of
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import check_measured, named, several
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
@@ -39,8 +40,6 @@ _AT_THE_END = 0.1  # of the model's range, for a record that begins there
 _SETTLED = 3.0  # time constants: then a twentieth is left of where a slow cause began
 _SOON = 0.005  # of the record: what has passed within such a time matters little
 _TOLD = 0.1  # % of the samples, in figures
-_MISSED = 3.0  # times the error of all that follows: a first stroke that outputs do not tell from others ...
-# ... and that every model misses so far is that of a device that was never cycled before
 
 
 @one_thread
@@ -254,8 +253,8 @@ def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int,
     second = max(second_stroke(part.input, low, high) for low, high in ends)
     if second > begin and all(_misses(part, second, dt_s, model) for model in models):
         return second, (
-            f"the first stroke ({second} samples) is left out: its error is more than {_MISSED:g} times that "
-            "of all that follows, like that of a device that was never cycled before"
+            f"the first stroke ({second} samples) is left out: its error is more than "
+            f"{LIMITS.first_stroke_missed:g} times that of all that follows, like that of a device that was never cycled before"
         )
     return begin, ""
 
@@ -277,7 +276,7 @@ def _misses(part: Run, first: int, dt_s: float | None, model: Model) -> bool:
     """Whether a model misses the first samples of a part far more than the others."""
     error = np.where(part.counts, part.output - predict(model, part.input, dt_s), 0.0)
     after = metrics.root_mean_square(error[first:])
-    return metrics.root_mean_square(error[:first]) > _MISSED * after
+    return metrics.root_mean_square(error[:first]) > LIMITS.first_stroke_missed * after
 
 
 def _of_model(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
-from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
+from pulsetrainer.artefacts.time_steps import BLOCK, GAP, gaps_of, steps_of
 from pulsetrainer.artefacts.units import counted, same_units, units_of, with_seconds, with_unit
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage, little_words, minor_coverage
@@ -24,7 +24,6 @@ from pulsetrainer.errors import ArgumentError, DataError, UsageError
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _JUMP, _FEW_JUMPS = 0.5, 3  # share of the range, and how many of them: more are how it was driven
 _EVEN = 0.05  # of the range: no other step is larger
-_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 _LEAST = 2  # samples between two gaps: of fewer there is no step to resample
 
 
@@ -161,8 +160,8 @@ def _jumps(run: Run) -> list[str]:
 def _far_steps(inputs: FloatArray, far: float) -> tuple[NDArray[np.int64], float]:
     """Return the steps (k,) of an input (n,) that are larger than ``far``, and the largest of the others."""
     found, other = [np.empty(0, np.int64)], 0.0
-    for k in range(0, inputs.size - 1, _BLOCK):
-        step = np.abs(np.diff(inputs[k : k + _BLOCK + 1]))
+    for k in range(0, inputs.size - 1, BLOCK):
+        step = np.abs(np.diff(inputs[k : k + BLOCK + 1]))
         large = step > far
         found.append(k + np.flatnonzero(large))
         other = max(other, float(step[~large].max(initial=0.0)))
