@@ -14,12 +14,7 @@ from pulsetrainer.files.settings import SETTINGS
 
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
-_SECONDS = {
-    "ms": 1e-3,
-    "s": 1.0,
-    "min": 60.0,
-    "h": 3600.0,
-}  # as in units, which loads numpy
+_SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}  # as in units, which loads numpy
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 _UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
 

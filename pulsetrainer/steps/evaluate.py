@@ -254,7 +254,8 @@ def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int,
     if second > begin and all(_misses(part, second, dt_s, model) for model in models):
         return second, (
             f"the first stroke ({second} samples) is left out: its error is more than "
-            f"{LIMITS.first_stroke_missed:g} times that of all that follows, like that of a device that was never cycled before"
+            f"{LIMITS.first_stroke_missed:g} times that of all that follows, like that of a device "
+            "that was never cycled before"
         )
     return begin, ""
 
