@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import turning_points
-from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, ends_of, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 _LITTLE = 0.1  # of the cells
@@ -60,7 +60,7 @@ def little_words(share: float) -> str:
 def covers_range(inputs: Sequence[FloatArray], low: float, high: float) -> bool:
     """Tell whether inputs (n,) together come near both ends of [low, high]: within a twentieth of it."""
     slack = _MISSING * (high - low)
-    lowest, highest = min(float(u.min()) for u in inputs), max(float(u.max()) for u in inputs)
+    lowest, highest = ends_of(inputs)
     return lowest <= low + slack and highest >= high - slack
 
 

@@ -20,7 +20,7 @@ from pulsetrainer.core.edges import plane_for
 from pulsetrainer.core.forms import BETTER, Form, Kept, Signals, Static, asked_forms, records_of
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.plane import FloatArray, Plane, Reading, ends_of
 from pulsetrainer.core.record import Record, counted_output
 
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
@@ -132,8 +132,8 @@ def _swapped(
 ) -> Identified:
     """Fit the operator from output to input, to the input."""
     swapped = exchanged(signals)
-    bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    return fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept, levels=levels).identified
+    ends = ends_of([y for y, _ in swapped])
+    return fit(swapped, *ends, n_h, smoothing=smoothing, kept=kept, levels=levels).identified
 
 
 def _dual(records: Sequence[Record], found: Identified) -> Fitted:

@@ -31,7 +31,7 @@ from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane, ends_of
 from pulsetrainer.core.record import Record, counted_output, levelled
 from pulsetrainer.core.smoothing import FOLDS, blocks, smoothed
 from pulsetrainer.errors import ArgumentError
@@ -189,7 +189,7 @@ def _each_out(
 def _held_out_dual(signals: Signals, folds: Sequence[IntArray], kept: Kept) -> float:
     """Rms error on held-out blocks of the form with the roles exchanged, in the output's unit."""
     swapped = exchanged(signals)
-    low, high = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
+    low, high = ends_of([y for y, _ in swapped])
     records = records_of(swapped, low, high, kept)
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     sign = polarity_of(records, plane)

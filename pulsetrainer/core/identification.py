@@ -22,7 +22,7 @@ from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
-from pulsetrainer.core.record import Record, counted_output, levelled
+from pulsetrainer.core.record import Record, counted, counted_output, levelled
 from pulsetrainer.core.smoothing import LEAST_SIGNED, Choice, choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, penalised
 from pulsetrainer.errors import ArgumentError, ConvergenceError
@@ -65,8 +65,7 @@ class Identified:
 
 def correlation_of(records: Sequence[Record]) -> float:
     """Return the correlation of input and output, -1..1; 0 where one of them does not vary."""
-    u = np.concatenate([r.input[r.counts] for r in records])
-    y = counted_output(records)
+    u, y = counted(records, [r.input for r in records]), counted_output(records)
     # both scaled to 1 first: the product of two small numbers must not underflow
     u, y = (
         x / max(float(np.abs(x).max(initial=0.0)), np.finfo(float).tiny) for x in (u - u.mean(), y - y.mean())

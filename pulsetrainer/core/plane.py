@@ -12,6 +12,7 @@ coordinate systems of one space.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -82,6 +83,11 @@ def ascending(low: float, high: float, *, what: str = "the input range") -> None
             f"{what} must have low < high, both finite, got low = {low:g}, high = {high:g}",
             hint="record an input that moves",
         )
+
+
+def ends_of(signals: Sequence[FloatArray]) -> tuple[float, float]:
+    """Return the lowest and the highest value of some signals (n,)."""
+    return min(float(one.min()) for one in signals), max(float(one.max()) for one in signals)
 
 
 MOST_LEVELS = 10_000  # fifty million cells

@@ -78,9 +78,14 @@ class Record:
         return np.where(self.counts, self.output, 0.0)
 
 
+def counted(records: Sequence[Record], signals: Sequence[FloatArray]) -> FloatArray:
+    """Samples that count (k,) of one signal (n,) per record, one record after another."""
+    return np.concatenate([x[r.counts] for x, r in zip(signals, records, strict=True)])
+
+
 def counted_output(records: Sequence[Record]) -> FloatArray:
     """Outputs (k,) of all samples that count, one record after another."""
-    return np.concatenate([r.output[r.counts] for r in records])
+    return counted(records, [r.output for r in records])
 
 
 def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], float]:
@@ -89,6 +94,6 @@ def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], fl
     Sums of squares far from zero have no digits left for what the output does: a force of 1000 N that moves
     by 1 mN is fitted as well as one around zero only after its mean is taken off.
     """
-    counted = counted_output(records)
-    zero = sign * float(np.mean(counted)) if counted.size else 0.0
+    y = counted_output(records)
+    zero = sign * float(np.mean(y)) if y.size else 0.0
     return [replace(r, output=sign * r.output - zero) for r in records], zero

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from pulsetrainer.core.input_noise import clean
 from pulsetrainer.core.memory import turning_points
-from pulsetrainer.core.plane import BoolArray, FloatArray, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, ends_of, finite_vector
 from pulsetrainer.core.wild import fits_better, left_by_a_quick_fit
 
 _AGAIN = 3  # turns within one step of an end of the record: they are meant to end there
@@ -100,8 +100,8 @@ def _remembers_its_output(
 
 def _span(signals: Sequence[FloatArray]) -> float:
     """Return the range of some signals together; infinity where they never move."""
-    span = max(float(one.max()) for one in signals) - min(float(one.min()) for one in signals)
-    return span or float("inf")
+    low, high = ends_of(signals)
+    return high - low or float("inf")
 
 
 def _ends_lie_at_samples(u: FloatArray, tips: FloatArray) -> bool:

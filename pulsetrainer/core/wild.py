@@ -16,7 +16,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise, nnls
 from pulsetrainer.core.equations import normal_equations
-from pulsetrainer.core.plane import BoolArray, FloatArray, Plane
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, ends_of
 from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import smoothed
 
@@ -179,6 +179,12 @@ def _body(values: FloatArray) -> float:
     return float(high - low)
 
 
+def runs_of(at: BoolArray) -> list[tuple[int, int]]:
+    """Return where each run of samples that are ``at`` (n,) begins, and the first sample after it."""
+    ends = np.flatnonzero(np.diff(at, prepend=False, append=False)).tolist()
+    return list(zip(ends[::2], ends[1::2], strict=True))
+
+
 def repaired(values: FloatArray, wild: BoolArray) -> FloatArray:
     """Return the signal (n,) with its wild samples taken between their neighbours."""
     if not wild.any():
@@ -194,8 +200,7 @@ def through_turns(values: FloatArray, wild: BoolArray) -> FloatArray:
     its neighbours a turn would lose its extreme, which is remembered.
     """
     path = repaired(values, wild)
-    ends = np.flatnonzero(np.diff(wild, prepend=False, append=False))
-    for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+    for first, end in runs_of(wild):
         left, right = path[max(first - _SIDE, 0) : first], path[end : end + _SIDE][::-1]
         if end - first > LONGEST or min(left.size, right.size) < _SIDE:
             continue
@@ -203,7 +208,7 @@ def through_turns(values: FloatArray, wild: BoolArray) -> FloatArray:
         if not (np.all(steps > 0) or np.all(steps < 0)):
             continue
         sign = np.sign(steps[0])
-        ahead = np.arange(1, end - first + 1)
+        ahead = np.arange(1.0, end - first + 1)
         met = np.minimum(_continued(sign * left, ahead), _continued(sign * right, ahead[::-1]))
         path[first:end] = sign * np.maximum(met, sign * path[first:end])
     return path
@@ -280,7 +285,7 @@ def left_by_a_quick_fit(signals: Sequence[tuple[FloatArray, FloatArray]], lost: 
     not count in the samples that are ``lost`` (n,).
     """
     # one input that is far off would leave all others in one cell of a common plane
-    low, high = min(float(u.min()) for u, _ in signals), max(float(u.max()) for u, _ in signals)
+    low, high = ends_of([u for u, _ in signals])
     if not high > low:
         return float("inf")
     plane = Plane.uniform(low, high, _QUICK_LEVELS)

@@ -21,7 +21,7 @@ from pulsetrainer.artefacts.units import unit_of, with_unit
 from pulsetrainer.core.coverage import coverage, covers_range
 from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, ends_of
 from pulsetrainer.core.record import counted_output
 from pulsetrainer.diagnosis import advice_wording, residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
@@ -52,7 +52,6 @@ def diagnosis_of(state: State) -> Diagnosis:
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
-    inputs = np.concatenate([record.input for record in problem.records])
     bench = advice_wording.Bench(
         scale,
         model.input_unit,
@@ -60,7 +59,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         given.ours,
         given.input_quantity,
         given.output_quantity,
-        (float(inputs.min()), float(inputs.max())),
+        ends_of([record.input for record in problem.records]),
         model.output_unit,
     )
     sign, words = model.polarity, _words(given) | bench.numbers()

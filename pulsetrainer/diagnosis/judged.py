@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, start_of
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, counted
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.diagnosis.causes import condition_change
 from pulsetrainer.diagnosis.extended import Term
@@ -46,7 +44,7 @@ class Judged:
 
     def kept(self, signals: Sequence[FloatArray]) -> FloatArray:
         """Return the samples with weight of one signal per record, one after another (n,)."""
-        return np.concatenate([y[one.counts] for y, one in zip(signals, self.records, strict=True)])
+        return counted(self.records, signals)
 
     def left_by(self, said: FloatArray) -> float:
         """Rms error of a prediction (n,), less the noise, output unit."""

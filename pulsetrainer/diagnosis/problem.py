@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray, Plane
-from pulsetrainer.core.record import Record, counted_output
+from pulsetrainer.core.record import Record, counted, counted_output
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import Bins, Followed, bins_of
 from pulsetrainer.diagnosis.extended import Term, seen_input
@@ -71,7 +71,7 @@ def problem_for(
     """
     bins = bins_of(records)
     measured = bins.average([r.output for r in records])
-    moved = np.concatenate([np.clip(r.input[r.counts], low, high) for r in records])
+    moved = np.clip(counted(records, [r.input for r in records]), low, high)
     if np.ptp(measured) == 0 or np.ptp(moved) == 0:
         what = "output" if np.ptp(measured) == 0 else "input"
         raise DataError(
@@ -104,8 +104,7 @@ def problem_for(
 
 def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:
     """Mean outputs near both ends of the input's range, or as near as the records come to them."""
-    u = np.concatenate([r.input[r.counts] for r in records])
-    y = counted_output(records)
+    u, y = counted(records, [r.input for r in records]), counted_output(records)
     near = LIMITS.near_end * (high - low)
     bottom = y[u <= max(low, float(u.min())) + near]
     top = y[u >= min(high, float(u.max())) - near]

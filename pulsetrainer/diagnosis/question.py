@@ -10,7 +10,7 @@ from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.artefacts.units import counted, same_units, units_of, with_unit
 from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
-from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray, ends_of
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.state import Given, Question
@@ -69,9 +69,8 @@ def question_of(
 
 def _outside_words(records: Sequence[Record], model_name: str, unit: str, low: float, high: float) -> str:
     """Say that records leave out a part of a model's range, and what comes of it."""
-    inputs = np.concatenate([one.input for one in records])
-    reached = with_unit(f"{inputs.min():.4g} .. {inputs.max():.4g}", unit)
-    whole = with_unit(f"{low:.4g} .. {high:.4g}", unit)
+    ends = (ends_of([one.input for one in records]), (low, high))
+    reached, whole = (with_unit(f"{bottom:.4g} .. {top:.4g}", unit) for bottom, top in ends)
     return f"the input covers {reached} of the {whole} of {model_name}, whose weights beyond stay as they are"
 
 
@@ -116,8 +115,7 @@ def range_of(model: Model, runs: Sequence[Run]) -> tuple[float, float]:
     if model.form != "dual" or model.fit is None:
         return low, high
     inputs = [one[np.isfinite(one)] for one in (model.fit.input, *(run.input for run in runs))]
-    ends = [(one.min(), one.max()) for one in inputs if one.size]
-    bottom, top = (float(pick(side)) for pick, side in zip((min, max), zip(*ends, strict=True), strict=True))
+    bottom, top = ends_of([one for one in inputs if one.size])
     return max(low, bottom), min(high, top)
 
 

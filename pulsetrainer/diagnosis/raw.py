@@ -108,12 +108,6 @@ def _gaps(stamps: FloatArray, step: float) -> BoolArray:
     return np.asarray(steps > LIMITS.gap_steps * usual)
 
 
-def runs_of(at: BoolArray) -> list[tuple[int, int]]:
-    """Return where each run of samples that are ``at`` (n,) begins, and the first sample after it."""
-    ends = np.flatnonzero(np.diff(at, prepend=False, append=False)).tolist()
-    return list(zip(ends[::2], ends[1::2], strict=True))
-
-
 def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
     """White noise (rms) of a record from its third differences, robust against jumps.
 

@@ -16,7 +16,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, counted, counted_output
 from pulsetrainer.diagnosis import wording
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -48,19 +48,12 @@ def compare(
     ``dt_s`` is the time step of each record, s; None where only the order of the samples is known: the
     direction of motion then takes the place of the velocity.
     """
-    kept = [r.counts for r in records]
-    output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])
-    left = np.concatenate([e[k] for e, k in zip(residuals, kept, strict=True)])
-    timed = all(step is not None for step in dt_s)
-    speed = np.concatenate(
-        [
-            _velocity(r.input, step if timed and step is not None else None)[k]
-            for r, step, k in zip(records, dt_s, kept, strict=True)
-        ]
-    )
+    output, left = counted_output(records), counted(records, residuals)
+    steps = dt_s if None not in dt_s else [None] * len(records)
+    speed = counted(records, [_velocity(r.input, step) for r, step in zip(records, steps, strict=True)])
     edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, LIMITS.speed_groups + 1)[1:-1]))
     group = np.searchsorted(edges, speed, side="right")
-    place = np.concatenate([r.input[k] for r, k in zip(records, kept, strict=True)])
+    place = counted(records, [r.input for r in records])
     rest, apart = (_within(group, values) for values in (output, place))
     square = float(apart @ apart)
     beside = rest - apart * (float(rest @ apart) / square) if square > 0 else rest

@@ -20,8 +20,9 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.wild import runs_of
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
-from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, runs_of, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _PARTS = 5  # of a rest, of which means are taken: shorter rests show no course

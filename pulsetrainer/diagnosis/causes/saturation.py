@@ -14,9 +14,10 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.censored import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.wild import runs_of
 from pulsetrainer.diagnosis.causes.base import OfTheRecord, Taken, Values
 from pulsetrainer.diagnosis.evidence import sentences
-from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, runs_of, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
