@@ -51,7 +51,6 @@ def diagnosis_of(state: State) -> Diagnosis:
     of_samples = scale.span * percent_of_samples(state)
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
-    ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     bench = advice_wording.Bench(
         scale,
         model.input_unit,
@@ -82,7 +81,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         evidence=_said(model, [wording.sentence(one, words) for one in state.evidence]),
         next_experiment="",
         profiles=_profiles(state, words),
-        time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
+        time_s=scale.second * problem.time_s[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
         output=sign * scale.outputs(problem.measured)[thin],
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],

@@ -43,7 +43,7 @@ class Bank:
 
     def __init__(self, fitted: Fitted, held_out: HeldOut, order: int) -> None:
         self.fitted = fitted
-        self.piece = held_out.piece_of(LIMITS.pieces)
+        self.piece = held_out.piece
         simulator = fitted.simulator
         before = [term for term in fitted.terms if term.cause.order < order]
         self.outputs = [

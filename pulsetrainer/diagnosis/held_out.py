@@ -57,22 +57,22 @@ class HeldOut:
 
     def gain_of_pieces(self, before: Fitted, after: Fitted, floor: Floor) -> float:
         """The same as ``gain``, by whole pieces of which a little is told."""
-        first, second = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
+        first, second = (float(np.sum(self.pieces(one))) for one in (before, after))
         return _share(first, second, floor)
 
-    def pieces(self, fitted: Fitted, count: int) -> FloatArray:
-        """Sums of squares (count,) on whole pieces of the time, each predicted from the others; or empty.
+    def pieces(self, fitted: Fitted) -> FloatArray:
+        """Sums of squares (pieces,) on whole pieces of the time, each predicted from the others; or empty.
 
         Blocks that alternate interpolate what wanders slowly; whole pieces have to predict it.
         """
-        return self._squares(fitted, count, "pieces")
+        return self._squares(fitted, LIMITS.pieces, "pieces")
 
-    def rates(self, fitted: Fitted, count: int) -> FloatArray:
-        """Sums of squares (count,) on the slowest to the fastest blocks, each predicted from the others.
+    def rates(self, fitted: Fitted) -> FloatArray:
+        """Sums of squares (rates,) on the slowest to the fastest blocks, each predicted from the others.
 
         Empty for too few blocks. A formula that only holds at the rates of a record misleads at others.
         """
-        return self._squares(fitted, count, "rates")
+        return self._squares(fitted, LIMITS.rates, "rates")
 
     def _squares(self, fitted: Fitted, folds: int, how: str) -> FloatArray:
         """Sum of squares of each fold, or nothing for too few blocks; made once for all who ask."""
@@ -83,9 +83,10 @@ class HeldOut:
             known[folds, how] = np.asarray([float(error @ error) for error, _ in errors])
         return known[folds, how]
 
-    def piece_of(self, count: int) -> IntArray:
-        """Return the number of the piece of the time that each average (count,) is in."""
-        return np.asarray(_fold_of(count, whole=True)[self.block])
+    @property
+    def piece(self) -> IntArray:
+        """Number of the piece of the time that each average (count,) is in."""
+        return np.asarray(_fold_of(LIMITS.pieces, whole=True)[self.block])
 
     def jackknife(self, fitted: Fitted) -> FloatArray | None:
         """Variances (p,) of the parameters from leaving out one tenth of the blocks after another.
@@ -139,11 +140,11 @@ def repeated(held_out: HeldOut, before: Fitted, after: Fitted) -> float:
     It is 0 where the error rises on any piece, or at any rates told from the others. A record too short to
     leave pieces out does not tell, and what is not told does not repeat.
     """
-    first, second = held_out.pieces(before, LIMITS.pieces), held_out.pieces(after, LIMITS.pieces)
+    first, second = held_out.pieces(before), held_out.pieces(after)
     if min(first.size, second.size) < LIMITS.pieces:
         return 0.0
     gains, fit = first - second, before.squares - after.squares
-    first_at, second_at = held_out.rates(before, LIMITS.rates), held_out.rates(after, LIMITS.rates)
+    first_at, second_at = held_out.rates(before), held_out.rates(after)
     told = min(first_at.size, second_at.size)  # a part that the larger model cannot do without tells nothing
     if min(gains.min(), (first_at[:told] - second_at[:told]).min(initial=np.inf)) < -LIMITS.piece_worse * fit:
         return 0.0

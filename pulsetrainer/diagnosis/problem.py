@@ -50,9 +50,14 @@ class Problem:
         plane = self.plane
         return problem_for(records, plane.low, plane.high, plane.n_h, signed=self.signed, base=self.base)
 
-    def coarser(self, levels: int) -> Problem:
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the averages (count,), records one after another."""
+        return self.bins.time_s + np.asarray([frame.begin_s for frame in self.frames])[self.bins.record]
+
+    def coarser(self) -> Problem:
         """Return the same on fewer levels."""
-        plane = Plane.uniform(self.plane.low, self.plane.high, levels)
+        plane = Plane.uniform(self.plane.low, self.plane.high, LIMITS.coarse_levels)
         return replace(self, plane=plane, _followed=OrderedDict())
 
 

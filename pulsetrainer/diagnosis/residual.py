@@ -51,8 +51,7 @@ def groups(problem: Problem) -> list[Group]:
     at_level = problem.plane.low + (np.arange(LIMITS.groups) + 0.5) / LIMITS.groups * reach
     count = speed.size
     by_time = np.arange(count) * LIMITS.groups // count
-    ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
-    time = problem.bins.time_s + ends[problem.bins.record]
+    time = problem.time_s
     at_time = np.asarray([time[by_time == k].mean() for k in range(LIMITS.groups)])
     direction = np.sign(np.where(speed < LIMITS.rate_edges[0], 0.0, rate)).astype(np.int64) + 1
     return [

@@ -146,7 +146,7 @@ def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
         return Screen()
     noise = noise_in(residual, project, _axes(blocks), problem.bins, problem.measured, rng)
     covariance = noise.covariance(project(_side_by_side(blocks)))
-    known, critical = _p_values(blocks, residual, covariance, LIMITS.draws, rng)
+    known, critical = _p_values(blocks, residual, covariance, rng)
     return Screen(_scores(fitted, blocks, residual, known, _sights(blocks, covariance, critical)), noise)
 
 
@@ -200,11 +200,7 @@ def _side_by_side(blocks: Sequence[_Block]) -> FloatArray:
 
 
 def _p_values(
-    blocks: Sequence[_Block],
-    residual: FloatArray,
-    covariance: FloatArray,
-    draws: int,
-    rng: np.random.Generator,
+    blocks: Sequence[_Block], residual: FloatArray, covariance: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
     """Family-wise p (blocks,) of every block on a residual, and the logarithm of its own p that is asked for.
 
@@ -212,15 +208,15 @@ def _p_values(
     """
     ends = np.cumsum([block.basis.shape[1] for block in blocks])
     size, axes = np.linalg.eigh(covariance)
-    white = rng.standard_normal((ends[-1], draws))
+    white = rng.standard_normal((ends[-1], LIMITS.draws))
     drawn = axes @ (np.sqrt(np.maximum(size, 0.0))[:, None] * white)
-    least, seen = np.zeros(draws), np.zeros(len(blocks))
+    least, seen = np.zeros(LIMITS.draws), np.zeros(len(blocks))
     for k, (block, end) in enumerate(zip(blocks, ends, strict=True)):
         part = slice(end - block.basis.shape[1], end)
         own = covariance[part, part] + TINY * np.eye(block.basis.shape[1])
         seen[k] = block.surprises(block.basis.T @ residual[:, None], own)[0]
         # what was chosen from the data has its own p, which under the null is any number alike
-        alike = np.log(rng.uniform(size=draws)) if block.choices else block.surprises(drawn[part], own)
+        alike = np.log(rng.uniform(size=LIMITS.draws)) if block.choices else block.surprises(drawn[part], own)
         least = np.minimum(least, alike)
     return np.asarray([p_value(-one, -least) for one in seen]), float(np.quantile(least, LIMITS.p_max))
 

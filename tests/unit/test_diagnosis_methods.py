@@ -374,7 +374,7 @@ def test_errors_of_folds_are_those_of_as_many_fits(name, values, whole, by_rate)
         means = [np.sqrt(np.mean(rate[held_out._by_rate == k] ** 2)) for k in range(LIMITS.blocks)]
         assert means == sorted(means)
         np.testing.assert_allclose(
-            held_out.rates(fitted, folds),
+            held_out._squares(fitted, folds, "rates"),
             [e @ e for e, _ in held_out._left_out(fitted, folds, whole=True, block=held_out._by_rate)],
         )
     block = held_out._by_rate if by_rate else held_out.block
@@ -469,7 +469,7 @@ def test_what_was_left_out_once_is_not_left_out_again():
     left_out = held_out._left_out
     held_out._left_out = lambda *one, **how: (asked.append(one), left_out(*one, **how))[1]
     for _ in range(3):
-        held_out.error(fitted), held_out.pieces(fitted, 5), held_out.rates(fitted, 4)
+        held_out.error(fitted), held_out.pieces(fitted), held_out.rates(fitted)
     assert [folds for _, folds in asked] == [2, 5, 4]
 
 
@@ -1278,8 +1278,8 @@ def test_a_cause_repeats_on_pieces_of_the_time_and_at_other_rates(pieces, rates,
     """The gain on the pieces over that of the fit; a tenth of that it may be worse on any."""
     before, after = SimpleNamespace(squares=30.0), SimpleNamespace(squares=20.0)
     told = SimpleNamespace(
-        pieces=lambda fitted, _: np.asarray(pieces) * (fitted is before),
-        rates=lambda fitted, _: np.asarray(rates) * (fitted is before),
+        pieces=lambda fitted: np.asarray(pieces) * (fitted is before),
+        rates=lambda fitted: np.asarray(rates) * (fitted is before),
     )
     assert repeated(told, before, after) == pytest.approx(share)
 
@@ -1288,8 +1288,8 @@ def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
     """The larger one needs what would be left out: that ended in an error of its own."""
     before, after = SimpleNamespace(squares=30.0), SimpleNamespace(squares=20.0)
     told = SimpleNamespace(
-        pieces=lambda fitted, _: np.full(5, 1.0 if fitted is before else 0.0),
-        rates=lambda fitted, _: np.zeros(4 if fitted is before else 0),
+        pieces=lambda fitted: np.full(5, 1.0 if fitted is before else 0.0),
+        rates=lambda fitted: np.zeros(4 if fitted is before else 0),
     )
     assert repeated(told, before, after) == pytest.approx(0.5)
 

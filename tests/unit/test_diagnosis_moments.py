@@ -37,7 +37,7 @@ def _told(record: Record, begun: float):
     """The moment of a step with its interval, when the search began at another one."""
     problem = problem_for([record], 0.0, 1.0)
     fitted = settled(problem, refit(problem, [Term(STEP, (0.001, 0.01, begun))], None))
-    floor = floor_of([record], [], problem).at(problem.coarser(32), fitted)
+    floor = floor_of([record], [], problem).at(problem.coarser(), fitted)
     noise = screen(fitted, np.random.default_rng(1))
     return estimates_of(fitted, noise, HeldOut(problem), floor)["step"][2]
 

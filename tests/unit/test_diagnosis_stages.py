@@ -97,9 +97,9 @@ class HeldOut:
     def __init__(self, gain: float = 1.0, pieces: tuple[float, ...] = ()) -> None:
         self.told, self.of_pieces = gain, pieces
 
-    def pieces(self, fitted, count):
+    def pieces(self, fitted):
         """As told for so many causes, the same on each piece."""
-        return np.full(count, self.of_pieces[len(fitted.terms)])
+        return np.full(LIMITS.pieces, self.of_pieces[len(fitted.terms)])
 
     def gain(self, before, after, floor):
         """Return what was told."""

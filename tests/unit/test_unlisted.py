@@ -328,10 +328,10 @@ class _Pieces:
     def __init__(self, **errors):
         self.errors = errors
 
-    def pieces(self, fitted, count):
+    def pieces(self, fitted):
         return np.asarray(self.errors[fitted.name], dtype=float)
 
-    def rates(self, fitted, count):
+    def rates(self, fitted):
         return np.zeros(0)  # too few blocks
 
 

@@ -25,7 +25,6 @@ from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.residual import TIME, excitation_limits
 from pulsetrainer.diagnosis.stages.raw_data import Masked
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(masked: Masked) -> State:
@@ -38,7 +37,7 @@ def stage(masked: Masked) -> State:
     signed = given is not None and given.model.form != "direct"
     base = None if given is None else base_of(given.model, masked.scale)
     problem = problem_for(records, 0.0, 1.0, signed=signed, base=base)
-    coarse = problem.coarser(LIMITS.coarse_levels)
+    coarse = problem.coarser()
     fitted = weights_for(problem, (), None)
     fired = [firing for _, firing in firings]
     floor = floor_of(masked.question.records, fired, problem, masked.scale.span)

@@ -94,5 +94,5 @@ def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted
     best = min(without, key=state.held_out.error, default=None)
     if best is None or not state.held_out.gain(best, current, state.floor) < 0:  # NaN: it cannot be told
         return None
-    fewer, more = (np.sum(state.held_out.pieces(one, LIMITS.pieces)) for one in (best, current))
+    fewer, more = (np.sum(state.held_out.pieces(one)) for one in (best, current))
     return best if fewer <= more else None
