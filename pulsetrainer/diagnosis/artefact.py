@@ -30,6 +30,7 @@ from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.fitting import added
 from pulsetrainer.diagnosis.forms import completed, levels_of, static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -214,10 +215,10 @@ def undone(state: State) -> list[FloatArray]:
     if fitted is None or not faults:
         return []
     others = [term for term in fitted.terms if term not in faults]
-    with_them, without = (fitted.simulator.full(terms) for terms in (fitted.terms, others))
+    effects = added(fitted.simulator, fitted.terms, others)
     found = []
     for k, (own, record) in enumerate(zip(question.records, state.problem.records, strict=True)):
-        effect = state.scale.span * (with_them[k] - without[k])
+        effect = state.scale.span * effects[k]
         seconds = state.scale.second * record.step * np.arange(effect.size)
         stamps = question.stamps[k] if question.stamps else None
         at = own.step * np.arange(own.output.size) if stamps is None else stamps - stamps[0]

@@ -140,13 +140,7 @@ class Extended:
         """
         upright = Extended(self.static, self.terms)
         target = self.polarity * np.asarray(target)
-        static_inverse = self._inverse(lead)
-        if inverse is not None:
-            within = inverse
-
-            def static_inverse(wanted: FloatArray) -> inversion.Inverse:
-                return within(self.polarity * wanted)
-
+        of_static = self._inverse(lead) if inverse is None else lambda wanted: inverse(self.polarity * wanted)
         late = min(self._late(dt_s), target.size - 1)
         hold = np.zeros(late, dtype=np.intp)
 
@@ -157,7 +151,7 @@ class Extended:
         best = None
         for tried in learning.passes(
             np.concatenate((target[late:], target[-1:][hold])),
-            static_inverse,
+            of_static,
             respond,
             smooth=learning.LowPass(band_Hz, dt_s),
         ):
@@ -171,7 +165,7 @@ class Extended:
             if tried.number == LIMITS.inverse_rounds:
                 break
         assert best is not None
-        return best if late == 0 else _in_time(best, static_inverse(target), target, respond)
+        return best if late == 0 else _in_time(best, of_static(target), target, respond)
 
     def _late(self, dt_s: float) -> int:
         """Whole steps by which delays make the output late."""

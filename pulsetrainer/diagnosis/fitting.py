@@ -158,6 +158,12 @@ class Simulator:
         return self.problem.bins.average(self.full(terms))
 
 
+def added(simulator: Simulator, terms: Sequence[Term], others: Sequence[Term] = ()) -> list[FloatArray]:
+    """Return what causes add to the output of each record (n,) beside ``others``, in units of the problem."""
+    pairs = zip(simulator.full(terms), simulator.full(others), strict=True)
+    return [whole - rest for whole, rest in pairs]
+
+
 def weights_for(
     problem: Problem, terms: Sequence[Term], near: Fitted | None, *, rebuild: bool = False
 ) -> Fitted:

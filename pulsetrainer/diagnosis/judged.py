@@ -10,7 +10,7 @@ from pulsetrainer.core import input_noise
 from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, start_of
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record, counted
-from pulsetrainer.diagnosis import velocity
+from pulsetrainer.diagnosis import fitting, velocity
 from pulsetrainer.diagnosis.causes import condition_change
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.prediction import operator_of, predict
@@ -87,6 +87,4 @@ def whole_and_each(judged: Judged) -> Iterator[tuple[int | None, Judged]]:
 
 def added(state: State, terms: Sequence[Term]) -> list[FloatArray]:
     """Return what causes add to the output of each record (n,), output unit."""
-    simulator = state.current.simulator
-    pairs = zip(simulator.full(terms), simulator.inner(()), strict=True)
-    return [state.scale.span * (full - plain) for full, plain in pairs]
+    return [state.scale.span * one for one in fitting.added(state.current.simulator, terms)]

@@ -23,6 +23,7 @@ import numpy as np
 
 from pulsetrainer.core.initial_state import known_from, left_out_words, second_stroke
 from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.diagnosis.fitting import added
 from pulsetrainer.diagnosis.stages import baseline, raw_data, whole_search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -30,12 +31,10 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state of a search without first strokes that are unlike the later ones."""
-    simulator = state.current.simulator
-    pairs = zip(simulator.full(state.current.terms), simulator.inner(()), strict=True)
-    static = [
-        even.output - (full - plain) for even, (full, plain) in zip(state.problem.records, pairs, strict=True)
-    ]
-    inputs = [even.input for even in state.problem.records]
+    current, records = state.current, state.problem.records
+    moved = added(current.simulator, current.terms)
+    static = [even.output - one for even, one in zip(records, moved, strict=True)]
+    inputs = [even.input for even in records]
     apart = [known_from(u, 0.0, 1.0, y) for u, y in zip(inputs, static, strict=True)]
     known = [known_from(u, 0.0, 1.0) for u in inputs]
     second = [second_stroke(u, 0.0, 1.0) for u in inputs]

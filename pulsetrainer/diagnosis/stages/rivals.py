@@ -43,7 +43,7 @@ from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late
 from pulsetrainer.diagnosis.finding import AT_BOUND, MAY_BE_WEAR, Estimate, Finding, may_be_nothing
-from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.fitting import added, refit
 from pulsetrainer.diagnosis.lines import is_a_line
 from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
@@ -144,8 +144,8 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
 
 def squares_added(state: State, term: Term) -> float:
     """Return the sum of squares of what a cause of the model adds to the output, averaged."""
-    added = _added(state, term)
-    return float(added @ added)
+    own = _added(state, term)
+    return float(own @ own)
 
 
 def squares_moved(state: State, term: Term) -> float:
@@ -154,15 +154,14 @@ def squares_moved(state: State, term: Term) -> float:
     Every model has a zero of its own. A fault that is over soon is mostly a shift. The result is scaled as
     for a drift that goes on evenly, of whose squares a quarter is left without the shift.
     """
-    added = _added(state, term)
-    return min(float(added @ added), LIMITS.even_drift * added.size * float(np.var(added)))
+    own = _added(state, term)
+    return min(float(own @ own), LIMITS.even_drift * own.size * float(np.var(own)))
 
 
 def _added(state: State, term: Term) -> FloatArray:
-    current, simulator = state.current, state.current.simulator
+    current = state.current
     others = [one for one in current.terms if one is not term]
-    pairs = zip(simulator.full(current.terms), simulator.full(others), strict=True)
-    return state.problem.bins.average([whole - rest for whole, rest in pairs])
+    return state.problem.bins.average(added(current.simulator, current.terms, others))
 
 
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
