@@ -117,7 +117,6 @@ MESSAGES = {
         "either sign", "`levels` {most} or less", expected="at most {most}", got="got {levels}"
     ),
     "plane too large": Message("dense", ""),
-    "too few blocks": Message("at least 2 blocks", "a shorter block"),
     "did not settle": Message("did not settle", "", expected="within {steps}"),
     "no beat of that number": Message("no beat", "from 1 to {count}", got="{count} whole beats"),
     "no whole beat": Message("no whole beat", ""),

@@ -50,13 +50,7 @@ class Course:
 
     def values(self, start: int, stop: int) -> FloatArray:
         """Samples ``start`` to ``stop``, (stop - start,)."""
-        one = self.signal.value
-        pieces = []
-        while start < stop:
-            first = start % one.size
-            pieces.append(one[first : first + stop - start])
-            start += pieces[-1].size
-        return np.concatenate(pieces) if pieces else np.zeros(0)
+        return self.signal.value.take(np.arange(start, stop), mode="wrap")
 
     def memory(self, count: int) -> State:
         """Return what the memory holds after ``count`` samples, when it began at the negative saturation.

@@ -24,6 +24,7 @@ import numpy as np
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.dual import Dual
+from pulsetrainer.core.input_noise import MEDIAN_TO_SIGMA
 from pulsetrainer.core.memory import Trace, negative_saturation, trace
 from pulsetrainer.core.operator import Preisach, steps
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
@@ -36,7 +37,6 @@ _ROUNDS = 6
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until one leaves less
 _ENOUGH = 0.01  # of what is minimised: steps that gain less are the last
 _HUBER = 2.0  # times the usual error: beyond, an error counts by its size only
-_MEDIAN_TO_SIGMA = 1.4826
 _FLAT = 0.05  # of the median slope of P: flatter, the output may be anywhere
 
 
@@ -122,7 +122,7 @@ def _step(
     ]
     error = measured - np.concatenate([y for y, _ in pairs])
     rows = np.concatenate([moved for _, moved in pairs])
-    usual = _MEDIAN_TO_SIGMA * float(np.median(np.abs(error)))
+    usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(error)))
     whole = max(_HUBER * usual, np.finfo(float).tiny)  # errors up to here count whole
     weight = whole / np.maximum(np.abs(error), whole)
     root = np.sqrt(weight)

@@ -74,19 +74,16 @@ def correlation_of(records: Sequence[Record]) -> float:
     return float(np.mean(u * y)) / size if size > 0 else 0.0
 
 
-def polarity_of(
-    records: Sequence[Record], plane: Plane | None = None, reading: Reading = "continuous"
-) -> int:
+def polarity_of(records: Sequence[Record], plane: Plane, reading: Reading = "continuous") -> int:
     """Return 1 when the output rises with the input, -1 when it falls.
 
-    It is the sign of their correlation. Where that is weaker than ``CLEAR`` and a ``plane`` is given, both
-    signs are fitted, and the one that leaves less is returned: the loop's direction then tells more than
-    its trend.
+    It is the sign of their correlation. Where that is weaker than ``CLEAR`` both signs are fitted, and the
+    one that leaves less is returned: the loop's direction then tells more than its trend.
 
     ConvergenceError where a fit did not settle.
     """
     correlation = correlation_of(records)
-    if plane is None or abs(correlation) >= CLEAR:
+    if abs(correlation) >= CLEAR:
         return -1 if correlation < 0 else 1
     coarse = thinned(plane, _SIGN_LEVELS)
     equations = normal_equations(coarse, levelled(records)[0], reading)

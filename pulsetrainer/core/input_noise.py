@@ -24,7 +24,7 @@ from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
 
 _FOURTH = np.asarray([1.0, -4.0, 6.0, -4.0, 1.0])  # squares add up to 70
-_MEDIAN_TO_SIGMA = 1.4826  # of the absolute value of a normal variable
+MEDIAN_TO_SIGMA = 1.4826  # of the absolute value of a normal variable
 # A dead-band wider than this share of the range would remove motion: the record is too coarse to tell.
 _WIDEST = 0.1
 # Samples of the local parabolas, the widest first.
@@ -74,7 +74,7 @@ def white(values: FloatArray) -> float:
     if values.size < _FOURTH.size:
         return 0.0
     fourth = np.convolve(values, _FOURTH, mode="valid")
-    return _MEDIAN_TO_SIGMA * float(np.median(np.abs(fourth))) / np.sqrt(70.0)
+    return MEDIAN_TO_SIGMA * float(np.median(np.abs(fourth))) / np.sqrt(70.0)
 
 
 def dead_band(sigma: float, n: int) -> float:

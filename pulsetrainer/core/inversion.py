@@ -19,7 +19,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
 
-from pulsetrainer.core.memory import State, Trace, negative_saturation, trace, trace_after
+from pulsetrainer.core.memory import State, Trace, negative_saturation, remembered_at, trace, trace_after
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
@@ -125,10 +125,8 @@ def invert(
     extreme, inner = nodes[path.parent[path.anchor]], path.anchor > 0
     u = np.where(inner & (rise > 0), np.minimum(u, extreme), u)
     u = np.where(inner & (rise < 0), np.maximum(u, extreme), u)
-    remembered = [int(path.anchor[-1])]  # the turns before the last sample, the latest first
-    while remembered[-1]:
-        remembered.append(int(path.parent[remembered[-1]]))
-    final = trace_after(nodes[remembered[::-1]], u[-1:], operator.plane.low, operator.plane.high).final
+    turns = nodes[remembered_at(int(path.anchor[-1]), path.parent)]
+    final = trace_after(turns, u[-1:], operator.plane.low, operator.plane.high).final
     return Inverse(u, clipped, final)
 
 

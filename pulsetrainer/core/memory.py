@@ -21,6 +21,7 @@ from pulsetrainer.core.branches import pieces
 from pulsetrainer.core.plane import FloatArray, IntArray, ascending, float_array
 from pulsetrainer.errors import ArgumentError
 
+_SWINGS = 200  # of a demagnetisation
 _Steps = TypeVar("_Steps")  # an array, or a sparse one
 
 
@@ -63,17 +64,15 @@ def positive_saturation(low: float, high: float) -> State:
     return State((float(low), float(high)))
 
 
-def demagnetised(low: float, high: float, swings: int = 200) -> State:
-    """Return the state after ``swings`` ever smaller swings around the middle of [low, high].
+def demagnetised(low: float, high: float) -> State:
+    """Return the state after many ever smaller swings around the middle of [low, high].
 
-    ArgumentError for an empty range or no swings.
+    ArgumentError for an empty range.
     """
     ascending(low, high)
-    if swings < 1:
-        raise ArgumentError(f"swings must be at least 1, got {swings}", hint="200 swings demagnetise well")
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    shrink = 1.0 - np.arange(swings) / swings
-    turns = middle + half * shrink * np.where(np.arange(swings) % 2 == 0, 1.0, -1.0)
+    shrink = 1.0 - np.arange(_SWINGS) / _SWINGS
+    turns = middle + half * shrink * np.where(np.arange(_SWINGS) % 2 == 0, 1.0, -1.0)
     return State((float(low), *np.minimum(turns, high).tolist()))
 
 
@@ -144,15 +143,16 @@ def trace_after(past: FloatArray, values: FloatArray, low: float, high: float) -
     ends = _piece_ends(path, turns, level, last)
     length = np.diff(np.concatenate(([1], ends, [path.size])))  # at last, samples that rest
     of_sample = np.repeat(np.append(anchor, node[-1]), length)[past.size - 1 :]
-    return Trace(path[past.size :], of_sample, node_value, parent, _state(int(node[-1]), node_value, parent))
+    final = State(tuple(node_value[remembered_at(int(node[-1]), parent)].tolist()))
+    return Trace(path[past.size :], of_sample, node_value, parent, final)
 
 
-def _state(node: int, node_value: FloatArray, parent: IntArray) -> State:
-    """Return what is remembered at a turning point."""
+def remembered_at(node: int, parent: IntArray) -> list[int]:
+    """Return the turning points that are remembered at one of them: from the negative saturation to it."""
     chain = [node]
     while chain[-1] > 0:
         chain.append(int(parent[chain[-1]]))
-    return State(tuple(node_value[chain[::-1]].tolist()))
+    return chain[::-1]
 
 
 def _piece_ends(path: FloatArray, turns: IntArray, level: FloatArray, last: IntArray) -> IntArray:

@@ -31,8 +31,7 @@ class Timing:
     """How a beat differs from an even, full one."""
 
     interval: float  # of the even one
-    strength: float  # of a full one
-    premature: bool
+    strength: float  # of a full one; a premature one is weaker
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +66,8 @@ class Rhythm:
         interval = 1.0 + self.variability * float(np.clip(draw, -_WIDEST, _WIDEST))
         interval *= 1.0 + self.respiration * float(np.sin(2.0 * np.pi * BREATH_Hz * time_s))
         if self._premature(number):
-            return Timing(interval * (2.0 - COUPLING), PREMATURE_STRENGTH, premature=True)
-        return Timing(interval * (COUPLING if self._premature(number + 1) else 1.0), 1.0, premature=False)
+            return Timing(interval * (2.0 - COUPLING), PREMATURE_STRENGTH)
+        return Timing(interval * (COUPLING if self._premature(number + 1) else 1.0), 1.0)
 
     def _premature(self, number: int) -> bool:
         """Whether a beat is premature: never the first, and never two in a row."""

@@ -65,11 +65,10 @@ class Windows:
 
     def add(
         self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, duty: FloatArray
-    ) -> int:
-        """Take in samples, shapes (n,), and return how many windows are new."""
+    ) -> None:
+        """Take in samples, shapes (n,)."""
         fresh = np.stack((time_s, reference_A, current_A, duty))
         self._held = np.concatenate((self._held, fresh[:, np.isfinite(duty)]), axis=1)
-        before = len(self.rows)
         while self._held.shape[1] > 1:
             end_s = self._held[0, 0] + WINDOW_S
             count = int(np.searchsorted(self._held[0], end_s - 1e-9))
@@ -77,7 +76,6 @@ class Windows:
                 break
             self.rows.append(_row(self._held[:, : count + 1]))
             self._held = self._held[:, count:]
-        return len(self.rows) - before
 
 
 def _row(block: FloatArray) -> FloatArray:
@@ -106,23 +104,20 @@ def heated(rows: FloatArray, tau_s: float, begin: float = 0.0) -> FloatArray:
 
 def record_of(windows: Windows) -> CoilRecord | None:
     """Return what a capture tells of the coil, by least squares over its windows; None if it is too short."""
-    rows = np.array(windows.rows)
-    enough = rows.size and np.count_nonzero(rows[:, 1] >= _LEAST_SAMPLES) >= _LEAST_WINDOWS
-    if not enough:
-        return None
+    rows = np.reshape(windows.rows, (-1, 9))
     used = rows[:, 1] >= _LEAST_SAMPLES
+    if np.count_nonzero(used) < _LEAST_WINDOWS:
+        return None
     some = rows[used]
     weight = np.sqrt(some[:, 1])
     plain = np.stack((np.ones(len(some)), some[:, 3], some[:, 4]), axis=1)
 
-    best = None
-    for tau in _TAUS_S:
+    def with_heat(tau: float) -> _Found:
         warm = heated(rows, tau)[used] * some[:, 3]
-        found = _least_squares(np.column_stack((plain, warm)), some[:, 2], weight)
-        if best is None or found.squares < best[0].squares:
-            best = found, float(tau)
-    assert best is not None
-    found, tau = best
+        return _least_squares(np.column_stack((plain, warm)), some[:, 2], weight)
+
+    tau = float(min(_TAUS_S, key=lambda one: with_heat(one).squares))
+    found = with_heat(tau)
     if found.value[3] > _CLEAR * found.error[3]:
         rise, error, tau_s = found.value[3] / found.value[1], found.error[3] / found.value[1], tau
     else:
@@ -195,12 +190,10 @@ class Thermometer:
         self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, duty: FloatArray
     ) -> bool:
         """Take in samples, shapes (n,); return whether there is news."""
-        fresh = self._windows.add(time_s, reference_A, current_A, duty)
-        told = False
-        for row in self._windows.rows[len(self._windows.rows) - fresh :]:
-            told = self._take(row) or told
-        del self._windows.rows[:]
-        return told
+        self._windows.add(time_s, reference_A, current_A, duty)
+        told = [self._take(row) for row in self._windows.rows]
+        self._windows.rows.clear()
+        return any(told)
 
     def _take(self, row: FloatArray) -> bool:
         own = self._own

@@ -52,7 +52,6 @@ class Ensemble:
     operator: Preisach
     weights: FloatArray  # (B, n_q) mu, output unit per input unit squared
     offsets: FloatArray  # (B,) y0, output unit
-    block: int  # samples a block
 
     def weight_interval(self) -> Interval:
         """Ends (n_q,) of the 90 % interval of every weight."""
@@ -98,38 +97,24 @@ def block_length(residuals: Sequence[FloatArray]) -> int:
 
 
 def bootstrap(
-    records: Sequence[Record],
-    fit: Identified,
-    *,
-    rng: np.random.Generator,
-    draws: int,
-    block: int | None = None,
+    records: Sequence[Record], fit: Identified, *, rng: np.random.Generator, draws: int
 ) -> Ensemble:
-    """Refit ``draws`` resamples of blocks of the records.
+    """Refit ``draws`` resamples of blocks of the records, as long as the residuals say.
 
-    Stiffness and polarity of the ``fit`` are kept, its smoothing is shortened. ``block`` is in samples; None
-    to read it off the residuals. ArgumentError for fewer than 2 draws, a block length below 1, fewer than 2
-    blocks, or a plane too large for dense matrices.
+    Stiffness and polarity of the ``fit`` are kept, its smoothing is shortened. ArgumentError for fewer than 2
+    draws, or a plane too large for dense matrices.
     """
     operator = fit.operator
     plane, sign = operator.plane, operator.polarity
-    if draws < 2 or (block is not None and block < 1):
-        raise ArgumentError(
-            f"draws must be at least 2 and block at least 1, got {draws} and {block}", hint="draws=200"
-        )
+    if draws < 2:
+        raise ArgumentError(f"draws must be at least 2, got {draws}", hint="draws=200")
     if not fits_dense(plane):
         raise ArgumentError(
             f"the bootstrap needs dense matrices, too large for {plane.n_h} levels", hint="use 48 levels"
         )
     turned, zero = levelled(records, sign)
     left = [(r.fitted_output - operator(r.input, r.start))[r.counts] for r in records]
-    length = block or block_length(left)
-    parts, count = _blocks(records, length)
-    if count < 2:
-        raise ArgumentError(
-            f"the records must hold at least 2 blocks of {length} samples, got {count}",
-            hint="use a longer record or a shorter block",
-        )
+    parts, count = _blocks(records, block_length(left))
     stack = _Stack(parted_sums(plane, turned, operator.reading, parts, count))
     weights, offsets = np.empty((draws, plane.n_q)), np.empty(draws)
     passive: BoolArray | None = operator.weights > 0
@@ -139,7 +124,7 @@ def bootstrap(
         gram, rhs = penalised(equations, _SHORTER * fit.smoothing, fit.stiffness)
         found = nnls.solve(gram, rhs, passive=passive)
         weights[k], offsets[k] = found.x / plane.areas, sign * (equations.offset(found.x) + zero)
-    return Ensemble(operator, weights, offsets, length)
+    return Ensemble(operator, weights, offsets)
 
 
 def _blocks(records: Sequence[Record], length: int) -> tuple[list[IntArray], int]:

@@ -144,7 +144,6 @@ BAD = {
     "state with a repeated extreme": (lambda: memory.State((0.0, 0.5, 0.5)), ["alternate", "0.5"]),
     "saturation of NaN": (lambda: memory.negative_saturation(NAN), ["state", "finite", "nan"]),
     "saturation upside down": (lambda: memory.positive_saturation(1.0, 0.0), ["state", "(1.0, 0.0)"]),
-    "demagnetised in no swings": (lambda: memory.demagnetised(0.0, 1.0, 0), ["swings", "at least 1", "0"]),
     "demagnetised in no range": (lambda: memory.demagnetised(1.0, 1.0), ["low < high", "1"]),
     # inversion
     "inverse of relays": (lambda: inversion.invert(RELAYS, [0.0]), ["relay", "continuous"]),

@@ -153,7 +153,7 @@ def test_records_share_an_offset_unless_they_differ():
 
 
 def test_polarity_by_trial():
-    """Where the correlation is weak both signs are fitted; without a plane the correlation decides."""
+    """Where the correlation is weak both signs are fitted; else it decides."""
     device = plant(12)
     u = np.concatenate((curves(300, 4, 4), np.tile([0.3, -0.3], 40)))
     loop = device(u) - 0.9 * np.polyval(np.polyfit(u, device(u), 1), u)  # the trend nearly gone
@@ -161,7 +161,7 @@ def test_polarity_by_trial():
     assert abs(identification.correlation_of([record])) < identification.CLEAR
     for sign in (1, -1):
         assert polarity_of([Record(u, sign * loop)], PLANE) == sign
-    assert polarity_of([Record(u, -u)]) == -1
+    assert polarity_of([Record(u, -u)], PLANE) == -1
     assert identification.correlation_of([Record(u, 1e-200 * u)]) == pytest.approx(1.0)
     spoilt, mask = u.copy(), np.ones(u.size)
     spoilt[::2], mask[::2] = -5.0 * u[::2], 0.0

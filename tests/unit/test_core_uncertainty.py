@@ -168,14 +168,12 @@ def test_a_stiff_density_stays_stiff():
 
 
 def test_bad_requests_are_named(monkeypatch):
-    """Draws, block length, and planes that do not fit."""
+    """Draws, and planes that do not fit."""
     record = Record(INPUT, CLEAN)
     fit = identify([record], PLANE)
     rng = np.random.default_rng(7)
     with raises(ArgumentError, "not such an argument", argument="draws", got="1"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=1)
-    with raises(ArgumentError, "too few blocks"):
-        uncertainty.bootstrap([record], fit, rng=rng, draws=9, block=2000)
     monkeypatch.setattr(identification, "DENSE_BYTES", 1000)
     with raises(ArgumentError, "plane too large"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=9)
