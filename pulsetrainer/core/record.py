@@ -68,6 +68,11 @@ class Record:
         return 1.0 if self.dt_s is None else self.dt_s
 
     @property
+    def time_s(self) -> FloatArray:
+        """Time since the first sample (n,), s; the number of the sample where no time is known."""
+        return np.asarray(np.arange(self.input.size) * self.step, dtype=np.float64)
+
+    @property
     def counts(self) -> BoolArray:
         """Which samples (n,) count in a fit."""
         return self.sample_weight > 0

@@ -221,7 +221,7 @@ def undone(state: State) -> list[FloatArray]:
         effect = state.scale.span * effects[k]
         seconds = state.scale.second * record.step * np.arange(effect.size)
         stamps = question.stamps[k] if question.stamps else None
-        at = own.step * np.arange(own.output.size) if stamps is None else stamps - stamps[0]
+        at = own.time_s if stamps is None else stamps - stamps[0]
         found.append(np.interp(at, seconds, effect))
     return found
 

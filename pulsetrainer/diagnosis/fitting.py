@@ -21,7 +21,7 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Quantity
+from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, hysteresis, in_order, shown_output
 from pulsetrainer.diagnosis.problem import Problem
@@ -100,13 +100,11 @@ class Fitted:
         frame = self.problem.frames[0]
         for k, term in enumerate(self.terms):
             for j, quantity in enumerate(term.cause.quantities(frame)):
-                step = _difference(quantity, term.values[j])
-                up = step if term.values[j] + step <= quantity.high else -step
-                moved = list(self.terms)
-                values = list(term.values)
-                values[j] += up
-                moved[k] = Term(term.cause, tuple(values))
-                found.append((moved, up))
+                value = term.values[j]
+                step = max(quantity.small, LIMITS.difference * abs(value))
+                up = step if value + step <= quantity.high else -step
+                moved = Term(term.cause, (*term.values[:j], value + up, *term.values[j + 1 :]))
+                found.append(([*self.terms[:k], moved, *self.terms[k + 1 :]], up))
         return found
 
 
@@ -229,10 +227,6 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
     return Design.build(problem.plane, bins, problem.paths(before), problem.smoothing, shown)
 
 
-def _difference(quantity: Quantity, value: float) -> float:
-    return max(quantity.small, LIMITS.difference * abs(value))
-
-
 def refit(
     problem: Problem,
     terms: Sequence[Term],
@@ -283,12 +277,11 @@ def refit(
 
 def _moved(terms: Sequence[Term], step: FloatArray, frame: Frame) -> tuple[Term, ...]:
     """Terms after a step, kept within their bounds and within a factor of three of where they were."""
-    moved, at = [], 0
+    moved, changes = [], iter(step.tolist())
     for term in terms:
         values = []
         for quantity, value in zip(term.cause.quantities(frame), term.values, strict=True):
-            new = value + float(step[at])
-            at += 1
+            new = value + next(changes)
             if quantity.low >= 0 and value > 0:
                 new = min(max(new, value / LIMITS.step_factor), value * LIMITS.step_factor)
             values.append(min(max(new, quantity.low), quantity.high))

@@ -168,11 +168,12 @@ class _Rows:
         """R'R (k + m, k + m) over the rows ``own`` (count,)."""
         beside = self._beside[own]
         cells, across = self._design.products(own, self._cells, beside)
+        squares = beside.T @ beside
         taken = self._design.taken[:, self._cells]
         along = taken.T @ across[:, self._starts].T
-        cells = cells - along - along.T + taken.T @ (beside.T @ beside)[self._starts, self._starts] @ taken
-        across = across - taken.T @ (beside.T @ beside)[self._starts]
-        return np.block([[cells, across], [across.T, beside.T @ beside]])
+        cells = cells - along - along.T + taken.T @ squares[self._starts, self._starts] @ taken
+        across = across - taken.T @ squares[self._starts]
+        return np.block([[cells, across], [across.T, squares]])
 
     def output(self, change: FloatArray) -> FloatArray:
         """What a change (k + m - 1,) of all that is fitted adds (count,)."""

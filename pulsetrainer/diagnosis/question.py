@@ -126,9 +126,7 @@ def measured_of(
 
     DataError where the run is too short.
     """
-    good = np.isfinite(run.input) & np.isfinite(run.output)
-    if run.reference is not None:
-        good &= np.isfinite(run.reference)
+    good = told_in(run)
     if good.sum() < LIMITS.least_samples:
         raise DataError(
             f"{name} has only {counted(int(good.sum()), 'sample')} with numbers, "
@@ -143,6 +141,12 @@ def measured_of(
     reference = None if run.reference is None else run.reference[good]
     step, stamps = _time_of(run, good)
     return Record(u, polarity * run.output[good], weight, dt_s=step, reference=reference), stamps
+
+
+def told_in(run: Run) -> BoolArray:
+    """Tell which samples (n,) of a run are numbers."""
+    good = np.isfinite(run.input) & np.isfinite(run.output)
+    return good if run.reference is None else good & np.isfinite(run.reference)
 
 
 def _time_of(run: Run, good: BoolArray) -> tuple[float | None, FloatArray | None]:

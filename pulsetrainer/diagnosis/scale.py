@@ -118,10 +118,7 @@ def second_of(
     """Return what a second is for the search of causes, s; 1 where the records have no time."""
     if not all(record.timed for record in records):
         return 1.0
-    times: list[FloatArray] = [
-        np.asarray(np.arange(record.input.size) * record.step) if known is None else known
-        for record, known in zip(records, stamps, strict=True)
-    ]
+    times = [record.time_s if known is None else known for record, known in zip(records, stamps, strict=True)]
     length = sum(float(one[-1]) for one in times)
     pieces = np.concatenate(
         [_pieces(record.input, one, high - low) for record, one in zip(records, times, strict=True)]

@@ -12,7 +12,7 @@ from pulsetrainer.core import wild
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library, upright_values
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
-from pulsetrainer.diagnosis.question import measured_of
+from pulsetrainer.diagnosis.question import measured_of, told_in
 from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import named
@@ -154,11 +154,8 @@ def _restored(
     step_s, begin_s = diagnosis.records[number].step_s, diagnosis.records[number].begin_s
     low, high = float(np.nanmin(part.input)), float(np.nanmax(part.input))
     record, stamps = measured_of("the run", part, diagnosis.polarity, low, high)
-    good = np.isfinite(part.input) & np.isfinite(part.output)
-    if part.reference is not None:
-        good &= np.isfinite(part.reference)
-    even = np.asarray(np.arange(record.input.size) * record.step, dtype=np.float64)
-    begun = even if stamps is None else stamps
+    good = told_in(part)
+    begun = record.time_s if stamps is None else stamps
     # the first average lies in the middle of its samples
     late = 0.5 * (step_s - record.step) if record.timed else 0.0
     raw = Raw(record, low, high, stamps=stamps)

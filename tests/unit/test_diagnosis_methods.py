@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term, chain
 from pulsetrainer.diagnosis.finding import Finding
-from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_for
+from pulsetrainer.diagnosis.fitting import Fitted, _moved, refit, weights_for
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut, repeated
 from pulsetrainer.diagnosis.problem import problem_for
@@ -201,9 +201,11 @@ def test_parameters_move_within_a_factor_of_three_and_their_bounds():
         assert one.values == pytest.approx((lags,))
         assert other.values == pytest.approx((skews,))
     assert _moved([Term(CAUSE["output-lag"], (0.4,))], np.asarray([9.0]), FRAME)[0].values == (0.5,)
-    (tau,) = CAUSE["output-lag"].parameters
-    assert _difference(tau, 0.1) == pytest.approx(0.002)
-    assert _difference(tau, 0.001) == 0.0005
+    for value, step in ((0.1, 0.002), (0.001, 0.0005), (0.5, -0.01)):  # at its upper bound it goes back
+        term, problem = Term(CAUSE["output-lag"], (value,)), SimpleNamespace(frames=[FRAME])
+        (((moved,), own),) = Fitted.moves.fget(SimpleNamespace(terms=(term,), problem=problem))
+        assert own == pytest.approx(step)
+        assert moved.values == (value + own,)
 
 
 def _loops(rate: float = 100.0) -> np.ndarray:

@@ -66,7 +66,7 @@ def stage(question: Question) -> Masked:
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     moved = map(as_it_moved, masked)
     even = [evenly(record, times) for record, times in zip(moved, stamps, strict=True)]
-    times = [np.asarray(one.step * np.arange(one.input.size)) if one.timed else None for one in even]
+    times = [one.time_s if one.timed else None for one in even]
     inputs = at_their_tips([(one.input, one.output) for one in even], times, [one.counts for one in even])
     even = [replace(one, input=u) for one, u in zip(even, inputs, strict=True)]
     scale = scale_of(even, low, high, second)
@@ -88,7 +88,7 @@ def followed(model: Model, record: Record, stamps: FloatArray | None, start: Sta
     """
     even = evenly(record, stamps)
     said = predict(model, even.input, even.step, start) * model.polarity
-    return said if stamps is None else np.interp(stamps, np.arange(said.size) * even.step, said)
+    return said if stamps is None else np.interp(stamps, even.time_s, said)
 
 
 def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
