@@ -38,5 +38,4 @@ def missed(
 def _rows(plane: Plane, values: FloatArray) -> scipy.sparse.csr_array:
     """Design rows (n, n_q + 1) of an input, the last column for the offset."""
     path = operator.follow(plane, np.clip(values, plane.low, plane.high), None, "continuous")
-    own, base = operator.rows(plane, path)
-    return scipy.sparse.hstack((own + base[path.anchor], np.ones((values.size, 1))), format="csr")
+    return scipy.sparse.hstack((operator.rows(plane, path), np.ones((values.size, 1))), format="csr")

@@ -36,10 +36,9 @@ class Path:
         """Path of an input (n,) over a range, at some of its samples (m,); ``rate`` (n,) as the field."""
         plane = Plane.uniform(*ends, _LEVELS)
         way = trace(values, negative_saturation(plane.low), plane.low, plane.high)
-        own, base = rows(plane, way)
+        chosen = rows(plane, way, at)
         risen = [
-            plane.adjoint((own[some] + base[way.anchor[some]]).toarray())
-            for some in np.split(at, range(_CHUNK, at.size, _CHUNK))
+            plane.adjoint(chosen[begin : begin + _CHUNK].toarray()) for begin in range(0, at.size, _CHUNK)
         ]
         share = np.sqrt(plane.areas / plane.areas.sum())
         return cls(rate[at], (np.concatenate(risen) - 1.0) * share)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -23,13 +22,6 @@ from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite
 from pulsetrainer.errors import ArgumentError
 
 _CHUNK = 4096  # samples at a time: their arrays stay in the cache
-
-
-class Rows(NamedTuple):
-    """Design rows in node space: row of sample t = own[t] + base[anchor[t]], the constant -W is left out."""
-
-    own: scipy.sparse.csr_array  # (n, n_q) the step from the anchor to the sample
-    base: scipy.sparse.csr_array  # (m, n_q) all steps up to each turning point
 
 
 def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> scipy.sparse.csr_array:
@@ -71,10 +63,13 @@ def _check_reading(reading: str) -> None:
         )
 
 
-def rows(plane: Plane, path: Trace) -> Rows:
-    """Design rows (n, n_q) of a traced input in node space, in two parts: see ``Rows``."""
-    own = steps(plane, path.value, path.node_value[path.anchor])
-    return Rows(own, base_rows(plane, path))
+def rows(plane: Plane, path: Trace, at: IntArray | slice = slice(None)) -> scipy.sparse.csr_array:
+    """Design rows (k, n_q) of samples of a traced input in node space; the constant -W is left out.
+
+    All steps up to the anchor of a sample, and the one from there to the sample.
+    """
+    anchor = path.anchor[at]
+    return steps(plane, path.value[at], path.node_value[anchor]) + base_rows(plane, path)[anchor]
 
 
 def base_rows(plane: Plane, path: Trace) -> scipy.sparse.csr_array:

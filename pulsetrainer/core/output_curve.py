@@ -21,11 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pulsetrainer.core import nnls
+from pulsetrainer.core import nnls, operator
 from pulsetrainer.core.edges import plane_for, thinned
 from pulsetrainer.core.memory import negative_saturation, trace
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.operator import base_rows, steps
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import FOLDS, blocks, penalty
@@ -88,9 +87,7 @@ def rivals(records: Sequence[Record], low: float, high: float) -> Rivals | None:
 def _states(plane: Plane, record: Record, at: IntArray) -> FloatArray:
     """States (k, n_q) of the cells in some samples (k,) of a record."""
     way = trace(record.input, record.start or negative_saturation(plane.low), plane.low, plane.high)
-    anchor = way.anchor[at]
-    own = steps(plane, way.value[at], way.node_value[anchor])
-    return plane.adjoint((own + base_rows(plane, way)[anchor]).toarray())
+    return plane.adjoint(operator.rows(plane, way, at).toarray())
 
 
 def _held_out_signed(plane: Plane, rows: FloatArray, y: FloatArray, fold: IntArray, s: float) -> float:

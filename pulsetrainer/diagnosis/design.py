@@ -26,7 +26,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.memory import Trace
-from pulsetrainer.core.operator import Preisach, follow, rows
+from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
@@ -236,9 +236,10 @@ class Design:
             inside = np.flatnonzero(number >= 0)
             where = number[inside]
             share = 1.0 / bins.sizes[where]
-            own, base = rows(plane, path.trace)
+            way = path.trace
+            own, base = steps(plane, way.value, way.node_value[way.anchor]), base_rows(plane, way)
             of_samples = scipy.sparse.csr_array((share, (where, inside)), shape=(bins.count, own.shape[0]))
-            anchor = path.trace.anchor[inside]
+            anchor = way.anchor[inside]
             of_nodes = scipy.sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
             packed = packed + of_samples @ own + of_nodes @ base
         if shown is None:

@@ -56,8 +56,7 @@ def test_continuous_reading_is_many_small_relays(world, parts, data):
 def test_design_rows_are_the_mean_states(world):
     """Rows in node space, carried to the cells, are the states of the relays plus the constant 1."""
     path = follow(world.plane, world.input, world.start, world.operator.reading)
-    own, base = rows(world.plane, path)
-    cells = world.plane.adjoint((own + base[path.anchor]).toarray()) - 1.0
+    cells = world.plane.adjoint(rows(world.plane, path).toarray()) - 1.0
     edges = world.plane.edges
     if world.operator.reading == "relay":
         states = oracle.relay_states(*oracle.relays(edges), world.input, world.past)

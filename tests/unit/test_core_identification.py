@@ -31,13 +31,7 @@ def noisy(seed, n=1500, n_h=12):
 
 def design(record, plane):
     """Rows (n, n_q) of a record in mass space, relays -1 or +1."""
-    both = rows(plane, follow(plane, record.input, None, "continuous"))
-    return (
-        plane.adjoint(
-            (both.own + both.base[follow(plane, record.input, None, "continuous").anchor]).toarray()
-        )
-        - 1.0
-    )
+    return plane.adjoint(rows(plane, follow(plane, record.input, None, "continuous")).toarray()) - 1.0
 
 
 def test_clean_data_give_back_the_plant():
