@@ -19,7 +19,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
 
-from pulsetrainer.core.memory import State, Trace, negative_saturation, remembered_at, trace, trace_after
+from pulsetrainer.core.memory import State, Trace, remembered_at, trace_after
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
@@ -161,12 +161,12 @@ def _heights(operator: Preisach, start: State | None) -> FloatArray:
     return np.append(0.0, np.cumsum(rise)) - operator.total
 
 
-def closest_match(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
+def closest_match(operator: Preisach, target: ArrayLike) -> Inverse:
     """Return the edges (n,), input unit, whose relay output is nearest to each target (n,) in turn.
 
-    From the present edge and memory: while the output is below the target step up one edge, keeping
-    the memory before the step; at the target, or at saturation, keep the nearer of the last two
-    (Tan, Baras, Krishnaprasad 2005, section 4). Mirrored when the output is above the target.
+    It begins at negative saturation. From the present edge and memory: while the output is below the target
+    step up one edge, keeping the memory before the step; at the target, or at saturation, keep the nearer of
+    the last two (Tan, Baras, Krishnaprasad 2005, section 4). Mirrored when the output is above the target.
 
     ArgumentError where the target is not a finite vector, or all weights are zero.
     """
@@ -174,10 +174,7 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
     _check_not_empty(operator)
     clipped, y = _into_reach(operator, wanted)
     grid, edges, top = operator.grid, operator.plane.edges, operator.plane.n_h
-    state = start or negative_saturation(operator.plane.low)
-    rounded = operator.plane.round_to_nodes(np.asarray(state.extremes))
-    settled = trace(rounded, negative_saturation(edges[0]), edges[0], edges[-1]).final
-    memory = _EdgeMemory(grid, [int(k) for k in np.searchsorted(edges, settled.extremes)])
+    memory = _EdgeMemory(grid, [0])
     chosen = np.empty(y.size, dtype=np.int64)
     for n, goal in enumerate(y.tolist()):
         direction = 1 if memory.output < goal else -1

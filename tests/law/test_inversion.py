@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from worlds import planes, state_after, values, worlds
+from worlds import planes, values, worlds
 
 import oracle
 from pulsetrainer.core.inversion import closest_match, invert, slew_limited, smoothed
@@ -186,37 +186,22 @@ def whole_numbered(draw):
         draw(st.lists(st.integers(0, 5), min_size=plane.n_q, max_size=plane.n_q).filter(any)), dtype=float
     )
     operator = Preisach(plane, mu, draw(st.sampled_from([0.0, 2.0])), "relay", draw(st.sampled_from([1, -1])))
-    past = draw(st.lists(values(plane), max_size=6))
     reach = int(operator.total) + 3
     target = draw(st.lists(st.integers(-2 * reach, 2 * reach), min_size=1, max_size=25))
-    return operator, past, np.array(target) / 2.0
+    return operator, np.array(target) / 2.0
 
 
 @given(whole_numbered())
 def test_closest_match_is_that_of_the_naive_twin(drawn):
     """Stepping an Everett memory chooses the levels that stepping the relays chooses."""
-    operator, past, target = drawn
+    operator, target = drawn
     plane = operator.plane
     goals = np.clip(operator.polarity * (target - operator.offset), -operator.total, operator.total)
-    level, reached = oracle.closest_match(plane.edges, operator.masses, goals, past)
-    found = closest_match(operator, target, state_after(plane, past))
+    level, reached = oracle.closest_match(plane.edges, operator.masses, goals)
+    found = closest_match(operator, target)
     assert np.array_equal(found.input, plane.edges[level])
-    played = operator(found.input, state_after(plane, past))
+    played = operator(found.input)
     assert played == pytest.approx(operator.offset + operator.polarity * reached, rel=0, abs=1e-9)
-
-
-@given(whole_numbered(), st.integers(1, 20))
-def test_closest_match_goes_on_from_its_final_state(drawn, cut):
-    """Two pieces give the levels of one piece."""
-    operator, past, target = drawn
-    cut = min(cut, target.size - 1)
-    if cut == 0:
-        return
-    whole = closest_match(operator, target, state_after(operator.plane, past))
-    first = closest_match(operator, target[:cut], state_after(operator.plane, past))
-    second = closest_match(operator, target[cut:], first.final)
-    assert np.array_equal(np.concatenate((first.input, second.input)), whole.input)
-    assert second.final == whole.final
 
 
 @given(worlds(least=0.01))
@@ -225,8 +210,8 @@ def test_closest_match_is_near_on_a_slow_target(world):
     operator = replace(world.operator, reading="relay")
     y = operator(world.input, world.start)
     rising = np.sort(y)[:: operator.polarity]
-    found = closest_match(operator, rising, world.start)
-    error = np.abs(operator(found.input, world.start) - rising)
+    found = closest_match(operator, rising)
+    error = np.abs(operator(found.input) - rising)
     i, j = world.plane.cell_indices
     bands = np.bincount(i, operator.masses), np.bincount(j, operator.masses)
     assert np.all(error <= 2 * np.maximum(*bands).max() + world.slack)
