@@ -18,6 +18,7 @@ from pulsetrainer.device.opening import open_device
 RATE_HZ = 1000.0
 HIGH_A = 1.5
 DT_S = 1.0 / RATE_HZ
+REST_S = 0.2
 # The bench's current filter makes the measured current late. Nothing in a record tells this from the device:
 # what can be identified is each lag relative to the measured current, and a force that leads it by this much.
 FILTER_S = 0.0001
@@ -169,10 +170,15 @@ class RefusedByTheDeviceError(RuntimeError):
     """The device trips at every amplitude: by the force, or as its sensor tells what cannot be."""
 
 
+class NothingHiddenError(RuntimeError):
+    """What was drawn never acts: the device does not reach the output at which it is clipped."""
+
+
 def measure(case: Case) -> Data:
     """Play the diagnostic signal on the bench; return what the device reports.
 
     A device that trips its force limit, as a ringing one may, is played at less.
+    RefusedByTheDeviceError where it trips at all; NothingHiddenError where nothing of the effect is there.
     """
     for high in (HIGH_A, 1.2, 0.9, 0.6, 0.4):
         record = _play(case, high)
@@ -180,12 +186,18 @@ def measure(case: Case) -> Data:
             break
     else:
         raise RefusedByTheDeviceError(case.port)
+    if "saturation" in case.causes:
+        twin = _play(case.healthy, high)
+        if twin is not None and twin.output.max() < case.truth["saturation"]["size"]:
+            raise NothingHiddenError(f"{case.port}: reaches {twin.output.max():.4g} N")
     records, range_high = [_spoilt(case, record)], high
     if "condition-change" in case.causes:
         change = case.truth["condition-change"]
         later = _play(replace(case, settings=case.settings | {"noise-seed": 1001}), high, seconds=30.0)
         assert later is not None
-        records.append(replace(later, output=later.output * (1 + change["gain"]) + change["offset"]))
+        # the offset is that at the output of empty memory
+        changed = later.output + change["gain"] * (later.output - _empty(case, high)) + change["offset"]
+        records.append(replace(later, output=changed))
     if "out-of-range" in case.causes:
         range_high = min(case.truth["out-of-range"]["high"], 0.9 * high)
     return Data(records, range_high, high)
@@ -196,8 +208,7 @@ def _play(case: Case, high: float, seconds: float | None = None) -> Record | Non
     if seconds is not None:
         value = value[: round(seconds * RATE_HZ)]
     with open_device(case.port) as device:
-        lead = excitations.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=0.2)
-        if device.play(lead, RATE_HZ).fault:
+        if device.play(_lead(high), RATE_HZ).fault:
             return None
         top = case.truth.get("current-tracking", {}).get("top", np.inf)
         got = device.play(np.minimum(value, top), RATE_HZ)
@@ -205,6 +216,17 @@ def _play(case: Case, high: float, seconds: float | None = None) -> Record | Non
         return None
     asked = got.reference_A if np.isinf(top) else value[got.tick // round(device.info.tick_rate_Hz / RATE_HZ)]
     return Record(got.current_A, got.force_N, dt_s=DT_S, reference=asked)
+
+
+def _lead(high: float) -> np.ndarray:
+    """Once around the major loop, and a rest: the memory is empty then."""
+    return excitations.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=REST_S)
+
+
+def _empty(case: Case, high: float) -> float:
+    """Output of empty memory."""
+    with open_device(case.port) as device:
+        return float(np.median(device.play(_lead(high), RATE_HZ).force_N[-round(REST_S / 2 * RATE_HZ) :]))
 
 
 def size_percent(case: Case, data: Data) -> float:

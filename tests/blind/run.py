@@ -30,6 +30,8 @@ def _job(job):
         return judge.judge(*job, sized=True).row()
     except hidden.RefusedByTheDeviceError as error:  # nothing was measured that could be judged
         return {"kind": job[0], "seed": job[1], "refused": str(error)}
+    except hidden.NothingHiddenError as error:
+        return {"kind": job[0], "seed": job[1], "nothing": str(error)}
     except Exception as error:  # a crash is a wrong answer, not a reason to stop
         return {"kind": job[0], "seed": job[1], "crash": f"{type(error).__name__}: {error}"}
 

@@ -39,7 +39,8 @@ def words(rows) -> str:
     """Return the figures in words, with 95 % confidence bounds."""
     crashed = [r for r in rows if "crash" in r]
     refused = [r for r in rows if "refused" in r]
-    rows = [r for r in rows if "crash" not in r and "refused" not in r]
+    nothing = [r for r in rows if "nothing" in r]
+    rows = [r for r in rows if not {"crash", "refused", "nothing"} & set(r)]
     kinds = {}
     for row in rows:
         kinds.setdefault(row["kind"].partition(":")[0], []).append(row)
@@ -75,6 +76,7 @@ def words(rows) -> str:
         f"| seconds of processor time, median and largest | {_median(seconds)}, {max(seconds):.0f} | |",
         f"| crashes | {len(crashed)} | 0 |",
         f"| cases that the device itself refuses to play | {len(refused)} | |",
+        f"| cases in which nothing of the effect is there | {len(nothing)} | |",
         "",
         "| cause | size [%] | right | class | parameter error [%] | covered | gain/oracle [%] | otherwise |",
         "|---|---|---|---|---|---|---|---|",
@@ -86,6 +88,7 @@ def words(rows) -> str:
         lines.append(f"| {name} | {limit(own, name)} | {len(own)} |")
     lines += [f"\ncrash: {r['kind']} {r['seed']} {r['crash']}" for r in crashed]
     lines += [f"\nrefused: {r['kind']} {r['seed']} {r['refused']}" for r in refused]
+    lines += [f"\nnothing hidden: {r['kind']} {r['seed']} {r['nothing']}" for r in nothing]
     return "\n".join(lines)
 
 
