@@ -143,6 +143,7 @@ class Model(Shown):
     form: str = "direct"  # "direct" | "dual" | "signed"
     as_measured: bool = False  # signs of parameters are those of the output; files of 0.1: of a rising one
     captured: bool = True  # on our own device; files of 0.1 do not say, and were
+    serial: str = ""  # serial number of the device that captured all of its runs
     coil: Coil | None = None  # of the first run that has one
     edges_unit: str = ""  # of the input, of a dual model of the output: follows from the form
     offset_unit: str = ""  # of the output, of a dual model of the input: follows from the form

@@ -26,7 +26,6 @@ class Coil:
     rise_per_A2: Annotated[float, Data("1/A^2", "rise of the resistance by the heat of the current")]
     rise_error_per_A2: Annotated[float, Data("1/A^2", "standard deviation of that")]
     rise_tau_s: Annotated[float, Data("s", "time constant of that heat")]
-    serial: str = ""  # of the device
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -60,6 +59,7 @@ class Run(Shown):
     complete: bool = True
     dropped_samples: int = 0  # lost on the wire; the samples that are here are right
     captured: bool = False  # on our own device; files of 0.1 do not say
+    serial: str = ""  # serial number of the device that captured it
     # (n,) true where the output is no measurement: left out of every fit and every error. None: all count
     masked: Annotated[BoolArray | None, Data("1", "sample is left out", "time")] = None
     corrected: tuple[str, ...] = ()  # causes that were taken out of it

@@ -118,9 +118,9 @@ class Job:
             if known and device.info.serial not in known:
                 said = f"{self._settings} has gains for {', '.join(known)} and none for {device.info.serial}"
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
-        of = model.coil.serial if model is not None and model.coil is not None else ""
-        if of not in ("", device.info.serial):
-            self.notes([f"the model is of {of}, but this is {device.info.serial}, whose force is different"])
+        this = device.info.serial
+        if model is not None and model.serial not in ("", this):
+            self.notes([f"the model is of {model.serial}, but this is {this}, whose force is different"])
         return device
 
     def alike(self, files: Sequence[Path]) -> None:

@@ -60,7 +60,10 @@ class RunRecorder:
         self._final = Path(path)
         self._overwrite = overwrite
         self._header = header
-        self._texts: dict[str, Any] = {"captured": True, "signal": signal}
+        by = header.provenance.device
+        self._texts: dict[str, Any] = {
+            "captured": True, "signal": signal, "serial": by.serial if by is not None else "",
+        }  # fmt: skip
         self.samples = 0  # that are safe on disk
         self.end_s = -np.inf  # time of the last one
         self._seams: list[int] = []  # numbers of the samples that come first after a pause

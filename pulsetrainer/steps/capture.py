@@ -91,9 +91,9 @@ def capture(
             Course(played, repeats), device, kept, tally, condition_first=condition, progress=progress
         )
     except (DeviceError, Interrupted) as error:  # between two parts
-        error.kept = kept.run(played.name, complete=False)
+        error.kept = kept.run(played.name, device.info.serial, complete=False)
         raise
-    run = kept.run(played.name, complete=ending.complete, coil=ending.coil)
+    run = kept.run(played.name, device.info.serial, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:
         raise DeviceError("the device sent no samples", hint="check the line to it")

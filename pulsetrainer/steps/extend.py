@@ -74,7 +74,7 @@ def extend(
             f"the run to verify with is one that {diagnosis_name} was made from: it cannot show what repeats",
             hint="give a run that was not diagnosed",
         )
-    extended = replace(extended, coil=model.coil, captured=model.captured)
+    extended = replace(extended, coil=model.coil, captured=model.captured, serial=model.serial)
     return extended if verify is None else _verified(model, extended, verify)
 
 

@@ -48,7 +48,7 @@ def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -
     coil = coil_of(model, asked=asked)
     if coil is None or model is None:
         return None
-    if asked is None and (coil.serial not in ("", device.info.serial) or not device.tells_duty):
+    if asked is None and (model.serial not in ("", device.info.serial) or not device.tells_duty):
         return None
     device.needs_duty("tracking heat")
     check_same_device(model, device)
@@ -76,9 +76,7 @@ def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:
 
 def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
     """Return the thermometer of a coil."""
-    known = asdict(coil)
-    del known["serial"]
-    return Thermometer(CoilRecord(**known), thermal)
+    return Thermometer(CoilRecord(**asdict(coil)), thermal)
 
 
 def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:

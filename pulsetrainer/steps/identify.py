@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
@@ -110,13 +110,7 @@ def identify(
     whole = several(runs)
     titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)
-    notes = [
-        f"{title} is incomplete; fitting the {run.input.size} samples it has"
-        + (": capture --resume would finish it" if run.captured else "")
-        for title, run in zip(titles, whole, strict=True)
-        if not run.complete
-    ]
-    notes += [f"{title}: {run.gap_words}" for title, run in zip(titles, whole, strict=True) if run.gap_words]
+    notes = _of_runs(titles, whole)
     titles, measured = _with_samples(titles, whole)
     raw = measured
     masked = [~part.counts for part in measured]
@@ -296,6 +290,26 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
     return low, high
 
 
+def _of_runs(titles: Sequence[str], runs: Sequence[Run]) -> list[str]:
+    """Say what of the runs a fit must do without: their ends, one device for all, turns in their gaps."""
+    named_runs, notes = list(zip(titles, runs, strict=True)), []
+    for title, run in named_runs:
+        if not run.complete:
+            mended = ": capture --resume would finish it" if run.captured else ""
+            notes.append(f"{title} is incomplete; fitting the {run.input.size} samples it has{mended}")
+    devices = sorted({run.serial for run in runs} - {""})
+    if len(devices) > 1:
+        several_of = f"the runs are of several devices, {' and '.join(devices)}"
+        notes.append(f"{several_of}: a model is of one device, so identify each by itself")
+    return notes + [f"{title}: {run.gap_words}" for title, run in named_runs if run.gap_words]
+
+
+def _only(serials: Iterable[str]) -> str:
+    """Return the serial number of all runs, empty where they are of several devices or do not tell it."""
+    different = set(serials)
+    return different.pop() if len(different) == 1 else ""
+
+
 def _are_ours(runs: Sequence[Run]) -> bool:
     """Whether all runs were captured on our own device."""
     return all(run.captured or run.signal in EXCITATIONS for run in runs)
@@ -402,6 +416,7 @@ def _model(
         # files of 0.1 do not say where a run is from; these names only captures had
         coil=next((run.coil for run in runs if run.coil is not None), None),
         captured=_are_ours(runs),
+        serial=_only(run.serial for run in runs),
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,
         fit=Fit(

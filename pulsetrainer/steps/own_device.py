@@ -19,9 +19,8 @@ def check_units(model: Model) -> None:
 
 def check_same_device(model: Model, device: Device) -> None:
     """Raise DataError for a model that was captured on another device, where it knows its serial number."""
-    serial = model.coil.serial if model.coil is not None else ""
-    if serial and serial != device.info.serial:
+    if model.serial not in ("", device.info.serial):
         raise DataError(
-            f"the model is of the device {serial}, this is {device.info.serial}",
+            f"the model is of the device {model.serial}, this is {device.info.serial}",
             hint="give the model of this device, or connect that one",
         )

@@ -90,7 +90,7 @@ class InMemory:
         """Say that the device was off since the last sample."""
         self._seams.append(self.samples)
 
-    def run(self, signal: str, *, complete: bool, coil: Coil | None = None) -> Run | None:
+    def run(self, signal: str, serial: str, *, complete: bool, coil: Coil | None = None) -> Run | None:
         """Return what was recorded; None where that is nothing."""
         if not self._blocks:
             return None
@@ -105,6 +105,7 @@ class InMemory:
             complete=complete,
             dropped_samples=self.dropped_samples,
             captured=True,
+            serial=serial,
             coil=coil,
         )
 
@@ -221,7 +222,7 @@ def record(
             fault = in_part(played.fault, begun_s)
             return Ending(complete=False, fault=fault, remedy=played.remedy, parts=parts)
     told = record_of(windows) if begun_cold and parts == 1 else None
-    coil = Coil(**asdict(told), serial=info.serial) if told is not None else None
+    coil = Coil(**asdict(told)) if told is not None else None
     return Ending(complete=True, fault="", remedy="", parts=parts, coil=coil)
 
 

@@ -10,7 +10,6 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
-from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.errors import Interrupted
 from wording import refusal, tells
 
@@ -155,8 +154,7 @@ def test_what_was_learnt_is_kept_when_it_is_stopped(passes):
 def test_a_drive_for_another_device_is_told(run, tmp_path):
     """By the serial number of its model; on its own device nothing is said."""
     model = pt.load(KEPT / "model.h5")
-    coil = Coil(0.4, 0.05, 0.001, 0.1, 0.01, 60.0, "BENCH-0")
-    pt.save(pt.invert("normal", replace(model, coil=coil), periods=1), tmp_path / "drive.h5")
+    pt.save(pt.invert("normal", replace(model, serial="BENCH-0"), periods=1), tmp_path / "drive.h5")
     for seed, told in ((0, False), (4, True)):
         for verb in ("play", "refine"):
             given = ("--passes", 1) if verb == "refine" else ("--repeats", 1)

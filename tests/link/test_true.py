@@ -42,7 +42,7 @@ def test_the_model_knows_its_coil(model):
     assert model.coil.duty_per_A == pytest.approx(5 / 12.6, rel=2e-3)
     assert model.coil.duty_offset == pytest.approx(0.6 / 12.6, rel=0.02)
     assert model.coil.rise_per_A2 == pytest.approx(0.012, rel=0.15)
-    assert model.coil.serial == "BENCH-1"
+    assert model.serial == "BENCH-1"
 
 
 @pytest.mark.parametrize(
@@ -139,9 +139,23 @@ def test_what_an_offset_and_a_gain_do_not_mend_is_refused(model):
     check_updatable(replace(model, extensions=(THERMAL,)))
 
 
+def test_a_short_capture_tells_its_device_too(tmp_path):
+    """Although it is too short to tell the coil; a model of two devices is of neither, and says so."""
+    runs = []
+    for seed in (1, 2):
+        with pt.open_device(f"bench:?seed={seed}") as device:
+            runs.append(pt.capture("identification", device, levels=4, speed_A_per_s=6.0))
+    pt.save(pt.identify(runs[0]), tmp_path / "model.h5")
+    alone, both = pt.load(tmp_path / "model.h5"), pt.identify(runs)
+    assert (alone.serial, alone.coil, both.serial) == ("BENCH-1", None, "")
+    assert any("several devices, BENCH-1 and BENCH-2" in note for note in both.fit.notes)
+    with pt.open_device("bench:?seed=2") as device, pytest.raises(DataError, match="BENCH-1, this is"):
+        pt.check(alone, device)
+
+
 def test_the_model_of_another_device_is_refused(model):
     """By its serial number: check, and heat that is asked for; heat by default is then off."""
-    other = replace(model, coil=replace(model.coil, serial="OTHER"), extensions=(THERMAL,))
+    other = replace(model, serial="OTHER", extensions=(THERMAL,))
     drive = pt.invert("normal", other, periods=2)
     with pt.open_device("bench:?seed=1") as device:
         with raises(DataError, "names it", named="OTHER"):

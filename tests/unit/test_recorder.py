@@ -63,7 +63,7 @@ def test_what_was_kept_is_counted(many, said):
 
 def test_the_same_file_as_the_store_writes(tmp_path):
     """A run recorded in batches and the same run written at once are equal trees, and read as equal."""
-    run = examples.run(100, signal="identification", dropped_samples=2, captured=True)
+    run = examples.run(100, signal="identification", dropped_samples=2, captured=True, serial="1")
     write(tmp_path / "store.h5", run, examples.header())
     with RunRecorder(tmp_path / "recorder.h5", examples.header(), signal="identification") as recorder:
         _record(recorder, run)
@@ -89,7 +89,8 @@ def test_an_exception_keeps_what_was_recorded(tmp_path, error):
     with pytest.raises(type(error)):
         capture()
     assert examples.equal(
-        read(tmp_path / "a.h5", Run), examples.run(40, complete=False, dropped_samples=3, captured=True)
+        read(tmp_path / "a.h5", Run),
+        examples.run(40, complete=False, dropped_samples=3, captured=True, serial="1"),
     )
     assert _names(tmp_path) == ["a.h5"]
 
@@ -193,7 +194,9 @@ def test_full_disk_keeps_what_is_there(tmp_path, monkeypatch):
     with raises(DataError, "disk is full", folder=tmp_path):
         recorder.append(9.0, 0.0, 0.0, 0.0)
     recorder.finish(complete=False)
-    assert examples.equal(read(tmp_path / "a.h5", Run), examples.run(30, complete=False, captured=True))
+    assert examples.equal(
+        read(tmp_path / "a.h5", Run), examples.run(30, complete=False, captured=True, serial="1")
+    )
     with raises(DataError, "disk is full", folder=tmp_path):
         RunRecorder(tmp_path / "b.h5", examples.header())
     assert _names(tmp_path) == ["a.h5"]
@@ -280,7 +283,7 @@ def partial(tmp_path):
 def test_a_cut_journal_keeps_every_whole_block(partial):
     """Cut after any byte: the samples of the whole blocks before it, in order, and nothing else."""
     content = partial.read_bytes()
-    assert examples.equal(read(partial, Run), examples.run(300, complete=False, captured=True))
+    assert examples.equal(read(partial, Run), examples.run(300, complete=False, captured=True, serial="1"))
     ends = [(block.end, block.samples.shape[1]) for block in blocks(partial)]
     rng = random.Random(SEED)
     print("seed", SEED)
