@@ -40,6 +40,8 @@ OF_THE_MEASUREMENT = (
     "quantisation",
     "outliers",
     "clock-skew",
+    "leak",
+    "frozen",
 )
 # two records, or no effect on the device
 NOT_JUDGED = ("condition-change", "current-tracking", "out-of-range", "clipped-input")

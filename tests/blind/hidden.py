@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import excitations
@@ -86,6 +87,11 @@ LIBRARY = {
         {},
         {"offset": s * _sign(r) * _log(r, 0.1, 0.4), "gain": s * _sign(r) * _log(r, 0.01, 0.04)},
     ),
+    "leak": lambda r, s: (
+        {},
+        {"rate": s * _log(r, 0.004, 0.3), "at first": r.uniform(-4, 4)},
+    ),
+    "frozen": lambda r, s: ({}, {"stretches": max(3, round(s * r.uniform(10, 40)))}),
     # what a driver delivers whose supply is too low; on the bench itself the firmware stops such a play
     "current-tracking": lambda r, _: ({}, {"top": r.uniform(1.24, 1.44)}),
     "out-of-range": lambda r, _: ({}, {"high": r.uniform(1.2, 1.4)}),
@@ -98,11 +104,20 @@ OUTSIDE = ("gain wander", "hidden load", "bursts")
 FAMILIES = (
     {"delay", "field-lag", "output-lag", "rate-widening", "viscous"},
     {"offset-drift", "step"},
-    {"creep", "accommodation"},
+    {"creep", "accommodation", "leak"},
 )
-# Not in pairs: a second record, effects that take data away, and a feedback that the weights of this
-# bench can hold as a whole (what is left of it is below a fortieth of a per cent of the span).
-ALONE = ("condition-change", "out-of-range", "clipped-input", "current-tracking", "load-dependence")
+# Not in pairs: an amplifier behind all that the bench measures, a second record, effects that take data
+# away, and a feedback that the weights of this bench can hold as a whole (what is left of it is below a
+# fortieth of a per cent of the span).
+ALONE = (
+    "leak",
+    "frozen",
+    "condition-change",
+    "out-of-range",
+    "clipped-input",
+    "current-tracking",
+    "load-dependence",
+)
 
 
 @dataclass(frozen=True)
@@ -254,12 +269,21 @@ def size_percent(case: Case, data: Data) -> float:
 def _spoilt(case: Case, record: Record) -> Record:
     """The record with what the bench itself cannot hide."""
     rng = np.random.default_rng([case.seed, 77])
-    t, y = np.arange(record.output.size) * DT_S, record.output
+    t, y = np.arange(record.output.size) * DT_S, record.output.copy()
     if "clock-skew" in case.causes:
         y = np.interp(t * (1.0 + case.truth["clock-skew"]["skew"]), t, y)
         if "quantisation" in case.causes:  # the other clock's converter has the same steps
             step = case.truth["quantisation"]["size"]
             y = np.round(y / step) * step
+    if "leak" in case.causes:  # z' = y' - k z, for an output that is straight between samples
+        left = np.exp(-case.truth["leak"]["rate"] * DT_S)
+        into = (1.0 - left) / (case.truth["leak"]["rate"] * DT_S)
+        moves = np.diff(y, prepend=y[0]) * into
+        moves[0] = case.truth["leak"]["at first"]
+        y = scipy.signal.lfilter([1.0], [1.0, -left], moves)
+    for _ in range(case.truth.get("frozen", {}).get("stretches", 0)):  # of 0.05 to 0.4 s
+        begin, length = int(rng.integers(0, y.size - 400)), int(rng.integers(50, 400))
+        y[begin : begin + length] = y[begin]
     if case.outside == "gain wander":
         y = y * (1.0 + 0.02 * np.sin(2 * np.pi * t / rng.uniform(7, 13) + rng.uniform(0, 6)))
     if case.outside == "hidden load":  # somebody leans on the device now and then

@@ -100,6 +100,7 @@ _GATED = (
     "current-tracking",
     "out-of-range",
     "clipped-input",
+    "frozen",
 )
 
 

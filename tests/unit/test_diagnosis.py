@@ -29,7 +29,7 @@ VOCABULARY = (
     *("delay", "output-lag", "field-lag", "rate-widening", "viscous", "creep", "thermal-drift"),
     *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
     *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
-    *("accommodation", "unlisted", "clipped-input"),
+    *("accommodation", "unlisted", "clipped-input", "leak", "frozen"),
 )
 # values that matter, and the values at which a cause does nothing
 STRENGTHS = {
@@ -44,6 +44,7 @@ STRENGTHS = {
     "periodic": ((0.1, 0.1, 7.0), (0.0, 0.0, 7.0)),
     "step": ((0.1, 0.02, 1.0), (0.0, 0.0, 1.0)),
     "clock-skew": ((1e-3,), (0.0,)),
+    "leak": ((0.1, 0.0), (0.0, 0.0)),
     "load-dependence": ((0.005,), (0.0,)),
     "accommodation": ((0.1, 10.0), (0.0, 10.0)),
 }
@@ -77,6 +78,15 @@ def test_an_unknown_cause_is_refused():
     """A model of a newer version is not read as something else."""
     with raises(DataError, "no such cause", named="ghost"):
         cause_named("ghost")
+
+
+def test_a_leak_follows_a_ramp_exactly():
+    """It is y0 + (1 - exp(-k t)) / k, and b (exp(-k t) - 1) of what had leaked before: z' = y' - k z."""
+    t, rate, zero = np.arange(500) * DT, 1.7, 0.3
+    frame = Frame(DT, t, 1.0, 1.0, zero=zero)
+    leaks = library()["leak"].on_output(t + zero, (rate, 0.2), frame)
+    said = zero - np.expm1(-rate * t) / rate + 0.2 * np.expm1(-rate * t)
+    np.testing.assert_allclose(leaks, said, atol=1e-12)
 
 
 def test_the_low_pass_follows_a_ramp_exactly():

@@ -462,6 +462,46 @@ def test_where_three_in_a_hundred_are_wild_those_beside_turns_are_too():
     assert np.count_nonzero(wild & ~found) <= 1
 
 
+def _frozen(u, y, stretches=((500, 560), (1700, 1760), (2600, 2700))):
+    y = y.copy()
+    for begin, end in stretches:
+        y[begin:end] = y[begin]
+    return y
+
+
+SWINGS = np.sin(np.arange(4000) / 160.0) / 2 + 0.5
+NOISY = np.tanh(2.0 * SWINGS) + 2e-3 * np.random.default_rng(9).standard_normal(4000)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-3])
+def test_a_recorder_that_repeats_a_value_is_frozen(step):
+    """All but the first sample of each stretch is left out; neither a single stretch nor none is a fault."""
+    y = np.round(NOISY / step) * step if step else NOISY
+    firing = CAUSE["frozen"].gate(_raw(_frozen(SWINGS, y), SWINGS))
+    told = np.flatnonzero(firing.mask)
+    assert set(range(501, 560)) <= set(told.tolist())
+    assert abs(told.size - (59 + 59 + 99)) <= 3  # a neighbour may be equal by chance
+    assert (firing.figures["stretches"], firing.figures["count"]) == (3.0, told.size)
+    assert not _fires("frozen", y, SWINGS)
+    assert not _fires("frozen", _frozen(SWINGS, y, [(500, 560)]), SWINGS)
+
+
+def test_what_may_repeat_a_value_is_not_frozen():
+    """A rest, a rail, hardly any noise, noise that is none near zero, coarse steps, a jump of the input."""
+    resting = np.where(np.arange(4000) // 100 % 5 == 0, 0.3, SWINGS)
+    assert not _fires("frozen", np.where(resting == 0.3, 0.25, NOISY), resting)
+    assert not _fires("frozen", np.minimum(NOISY, 0.8), SWINGS)
+    assert not _fires("frozen", _frozen(SWINGS, np.tanh(2.0 * SWINGS)), SWINGS)
+    above = np.maximum(SWINGS - 0.5, 0.0)
+    assert not _fires("frozen", above * (1.0 + 0.01 * np.random.default_rng(3).standard_normal(4000)), SWINGS)
+    assert not _fires("frozen", _frozen(SWINGS, np.round(NOISY / 0.02) * 0.02), SWINGS)
+    y = _frozen(SWINGS, NOISY)
+    jumps = SWINGS.copy()
+    for end in (560, 1760, 2700):
+        jumps[end:] += 0.3
+    assert not _fires("frozen", y, jumps)
+
+
 def test_the_first_and_the_last_stroke_are_no_step():
     """One range and a half on either side, or a quarter of what the input went."""
     u = np.interp(np.linspace(0.0, 10.0, 1000), np.arange(11), np.arange(11) % 2)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import truncnorm
 
 import pulsetrainer as pt
@@ -74,10 +75,16 @@ def _added(name, y, t):
     if name == "periodic":
         phase = 2 * np.pi * 7.3 * t
         return y + 0.2 * np.sin(phase) - 0.1 * np.cos(phase), {"sine": 0.2, "cosine": -0.1, "frequency": 7.3}
+    if name == "leak":  # of which 0.7 had leaked before
+        left = np.exp(-0.3 / RATE_HZ)
+        moves = np.diff(y, prepend=0.0) * (1.0 - left) * RATE_HZ / 0.3
+        moves[0] = y[0]
+        leaking = lfilter([1.0], [1.0, -left], moves) + 0.7 * np.expm1(-0.3 * t)
+        return leaking, {"rate": 0.3, "before": 0.7}
     return np.interp(t * 0.999, t, y), {"skew": -0.001}
 
 
-@pytest.mark.parametrize("name", ["offset-drift", "step", "periodic", "clock-skew"])
+@pytest.mark.parametrize("name", ["offset-drift", "step", "periodic", "clock-skew", "leak"])
 @pytest.mark.parametrize("polarity", [1, -1])
 def test_what_was_added_is_taken_out(clean, name, polarity):
     """To the last digits where it was added, to what noise interpolates where time was stretched."""

@@ -77,7 +77,7 @@ class StickSlip(OfTheRecord):
     order = 3
     family = "stick-slip"
     jagged = True
-    blinded_by = ("saturation",)
+    blinded_by = ("saturation", "frozen")
     doubted = True
     size = "of a typical jump of the {output}"
     texts = sentences("""

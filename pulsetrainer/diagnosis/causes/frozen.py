@@ -1,0 +1,65 @@
+"""the output freezes: a recorder repeats its last value while the device moves on; found on the raw data.
+
+Noise changes a value from sample to sample. So a value that is repeated exactly, more often than chance
+allows, was not measured anew, if meanwhile the input moves, and the output then jumps to where it has come.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pulsetrainer.core.wild import runs_of
+from pulsetrainer.diagnosis.causes.base import OfTheRecord
+from pulsetrainer.diagnosis.evidence import sentences
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
+
+_NOISY = 1.0  # converter steps: with less noise a value repeats itself
+_EQUAL = 2.0 * np.pi**0.5  # the share of equal neighbours is a step over so many times the noise ...
+_MOST = 0.5  # ... and no more than this
+_CHANCE = 1e-6  # that a record has one such stretch
+_LEAST = 5  # equal values in a row: fewer may be rounding
+_MOVED = 0.01  # of the range: the input must go on by this much meanwhile
+_JUMP = 8.0  # times the noise: by so much the next value must differ
+_TIMES = 2  # a single stretch may be anything
+
+
+class Frozen(OfTheRecord):
+    """Stretches in which one value is repeated."""
+
+    id = "frozen"
+    title = "the {output} freezes: its recorder repeats one value while the device moves on"
+    formula = "y is held, then jumps to where it has come"
+    signature = "equal values without noise in the middle of noise, and a jump after them"
+    excitation = "any that moves"
+    order = 2
+    family = "frozen"
+    corrects = True
+    size = "of the largest jump of the {output} after it was frozen"
+    texts = sentences("""
+        gate: {stretches:.0f} stretches repeat one value exactly, {count:.0f} samples in all, while the input
+            moves and other samples have noise: the recorder missed what happened there
+    """)
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Equal values in a row, too many for the noise, that end with a jump."""
+        y, u = raw.calm.output, raw.record.input
+        noise, step = noise_of(y), spacing_of(y)
+        if noise <= _NOISY * step or y.size <= _LEAST:
+            return None
+        equal = min(step / (_EQUAL * noise), _MOST)
+        least = max(_LEAST, 1 + int(np.ceil(np.log(_CHANCE / y.size) / np.log(equal)))) if equal else _LEAST
+        mask, jumps = np.zeros(y.size, dtype=np.bool_), []
+        breaks = raw.beside_breaks(1)
+        for begin, last in runs_of(np.diff(y) == 0.0):
+            held = slice(begin, last + 1)
+            jump = abs(float(y[last + 1] - y[last])) if last + 1 < y.size else 0.0
+            at_an_end = y[begin] in (y.min(), y.max())
+            if last + 1 - begin < least or at_an_end or np.ptp(u[held]) <= _MOVED * raw.reach:
+                continue
+            mask[begin + 1 : last + 1] = True
+            if jump > _JUMP * noise and not breaks[last : last + 2].any():
+                jumps.append(jump)
+        if len(jumps) < _TIMES:
+            return None
+        figures = {"stretches": float(len(runs_of(mask))), "count": float(np.count_nonzero(mask))}
+        return Firing(self.id, "gate", max(jumps), "{y}", figures, mask)
