@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shlex
 from functools import partial
@@ -125,9 +124,7 @@ def _again(
 def _beside(path: Path, called: str) -> Path:
     """Return a name in this folder that is like another one, and neither taken nor that one itself."""
     stem = re.sub(rf"-{called}(-\d+)?$", "", path.stem)
-    numbers = itertools.chain(("",), (f"-{number}" for number in itertools.count(2)))
-    names = (Path(f"{stem}-{called}{number}{path.suffix}") for number in numbers)
-    return next(one for one in names if one.name != path.name and not one.exists())
+    return free(Path(f"{stem}-{called}{path.suffix}"), but=path.name)
 
 
 def _extended(model: Path) -> Path:
