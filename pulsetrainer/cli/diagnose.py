@@ -12,7 +12,7 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, Report
 from pulsetrainer.files.output_name import free
 from pulsetrainer.steps.arguments import check_once
 
@@ -22,7 +22,7 @@ def diagnose(
     runs: Annotated[list[Path], Argument(help="Runs of the device.", metavar="RUN.h5...")],
     model: Annotated[Path, Option(help="Model to be diagnosed.")],
     out: Out,
-    html: Annotated[Path | None, Option(help="Report to write.")] = None,
+    html: Report = None,
     quick: Annotated[bool, Option("--quick", help="Only screen: takes seconds, refits nothing.")] = False,
     seed: Annotated[int, Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     overwrite: Overwrite = False,
