@@ -88,15 +88,12 @@ def time_of(
 
 def _unread(table: Table) -> str:
     """Say that the column of the date is text: how no time is written that can be read."""
-    name = next((own for own in table.names if own in table.text_names and _tells_when(own)), None)
+    texts = (own for own in table.names if own in table.text_names)
+    name = next((own for own in texts if is_called_time(own) or own.lower() in _DATES), None)
     if name is None or not table.shifts:
         return ""
     cell = cell_at(table.path, table.line_of(0), table.names.index(name))
     return f" (its {column_words(name)} could not be read as time: {cell!r})"
-
-
-def _tells_when(heading: str) -> bool:
-    return is_called_time(heading) or heading.lower() in _DATES
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
