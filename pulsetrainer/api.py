@@ -128,15 +128,10 @@ def open_device(
     return device
 
 
-def check_device(port: str | None, *, limits: Limits | None = None, tuned: Path | str | None = None) -> None:
+def check_device(port: str | None, *, limits: Limits, tuned: Path | str | None = None) -> None:
     """Refuse what ``open_device`` would for a device as it is delivered, without touching a port.
 
-    Raises
-    ------
-    UsageError
-        The text names no kind of port or no such bench, or the file of settings cannot be used.
-    ArgumentError
-        A limit is not positive, or above the device's own.
+    Raises as ``open_device``, as far as the texts tell; UsageError also where there is no such bench.
     """
     _known_gains(tuned)
     text = port or _device.DEFAULT_PORT
@@ -145,7 +140,7 @@ def check_device(port: str | None, *, limits: Limits | None = None, tuned: Path 
         from pulsetrainer.simulation.bench import check_bench  # noqa: PLC0415 - what a bench alone needs
 
         check_bench(text)
-    Rehearsal(limits or Limits())
+    Rehearsal(limits)
 
 
 def _known_gains(tuned: Path | str | None) -> dict[str, Gains]:

@@ -66,13 +66,13 @@ def _finding(name: str, found: str, *, warning: str | None = None, problem: str 
 
 
 def examine(
-    port: str | None = None,
+    port: str | None,
     *,
-    capture: bool = True,
-    limits: Limits | None = None,
-    settings: str = "",
-    tuned: Path | None = None,
-    progress: Callable[[float], None] = lambda _share: None,
+    capture: bool,
+    limits: Limits,
+    settings: str,
+    tuned: Path | None,
+    progress: Callable[[float], None],
 ) -> list[Finding]:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
 
@@ -86,7 +86,7 @@ def examine(
         _folder,
         lambda: iter([_finding("settings", settings or "none: defaults")]),
         _ports,
-        lambda: _device(port, limits or Limits(), tuned, capture=capture),
+        lambda: _device(port, limits, tuned, capture=capture),
     ]
     found: list[Finding] = []
     for number, look in enumerate(looks):

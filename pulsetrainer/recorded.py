@@ -21,7 +21,7 @@ from pulsetrainer.files.session_recorder import SessionRecorder
 from pulsetrainer.steps.capture import tally_of
 from pulsetrainer.steps.conductor import Decide
 from pulsetrainer.steps.performance import Performed
-from pulsetrainer.steps.progress import Progress, silent
+from pulsetrainer.steps.progress import Progress
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.recording import Watch, decimation_for, record
 from pulsetrainer.steps.session import perform
@@ -51,12 +51,12 @@ def capture_into(
     device: Device,
     *,
     levels: int,
-    earlier: Earlier | None = None,
-    at: int = 0,
-    overwrite: bool = False,
-    condition: bool = True,
-    progress: Progress = silent,
-    watch: Watch | None = None,
+    earlier: Earlier | None,
+    at: int,
+    overwrite: bool,
+    condition: bool,
+    progress: Progress,
+    watch: Watch | None,
 ) -> Captured:
     """Play a course from sample ``at`` on and record it into a file, or go on with one that was cut off.
 
@@ -121,7 +121,7 @@ def session_into(
     decide: Decide,
     *,
     blind: Blind | None,
-    overwrite: bool = False,
+    overwrite: bool,
     **options: Any,
 ) -> tuple[Performed, Quiz | None]:
     """Press a session as ``perform`` does, with its ``options``, and record it into a file.

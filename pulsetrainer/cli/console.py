@@ -73,10 +73,6 @@ class Screen:
         self.is_terminal = sys.stdout.isatty()
         self.width = shutil.get_terminal_size().columns if self.is_terminal else _PIPE_WIDTH
 
-    def note(self, text: str, lead: str = "note: ") -> None:
-        """Say one line to the person, beside the results; on a terminal folded between words."""
-        say(lead, text)
-
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:
         """Give a callable that takes the share of the work done; on a terminal it moves a bar."""

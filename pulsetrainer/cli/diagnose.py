@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shlex
 from functools import partial
@@ -13,7 +12,7 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, Report
 from pulsetrainer.files.output_name import free
 from pulsetrainer.steps.arguments import check_once
 
@@ -23,7 +22,7 @@ def diagnose(
     runs: Annotated[list[Path], Argument(help="Runs of the device.", metavar="RUN.h5...")],
     model: Annotated[Path, Option(help="Model to be diagnosed.")],
     out: Out,
-    html: Annotated[Path | None, Option(help="Report to write.")] = None,
+    html: Report = None,
     quick: Annotated[bool, Option("--quick", help="Only screen: takes seconds, refits nothing.")] = False,
     seed: Annotated[int, Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     overwrite: Overwrite = False,
@@ -125,9 +124,7 @@ def _again(
 def _beside(path: Path, called: str) -> Path:
     """Return a name in this folder that is like another one, and neither taken nor that one itself."""
     stem = re.sub(rf"-{called}(-\d+)?$", "", path.stem)
-    numbers = itertools.chain(("",), (f"-{number}" for number in itertools.count(2)))
-    names = (Path(f"{stem}-{called}{number}{path.suffix}") for number in numbers)
-    return next(one for one in names if one.name != path.name and not one.exists())
+    return free(Path(f"{stem}-{called}{path.suffix}"), but=path.name)
 
 
 def _extended(model: Path) -> Path:

@@ -10,7 +10,7 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.cli.options import AsJson, Overwrite, Report
 from pulsetrainer.steps.arguments import check_measured, check_once
 
 
@@ -22,7 +22,7 @@ def evaluate(
     ],
     model: Annotated[list[Path], Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
     out: Annotated[Path | None, Option("-o", "--out", help="File to write.")] = None,
-    html: Annotated[Path | None, Option(help="Report to write.")] = None,
+    html: Report = None,
     bounds: Annotated[
         Path | None, Option(help="TOML file of bounds; exit code 1 if a figure is outside them.")
     ] = None,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Context, Option
+from typer import Context, Option
 
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.cli.options import AnyFile, AsJson, Overwrite
 from pulsetrainer.errors import EndingError
 
 _TABLES = (".csv", ".txt")
@@ -16,7 +16,7 @@ _TABLES = (".csv", ".txt")
 
 def export(
     context: Context,
-    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    file: AnyFile,
     out: Annotated[Path, Option("-o", "--out", help="Table to write, as CSV.", metavar="FILE.csv")],
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from pulsetrainer.cli.console import Screen, plain, shows_unicode
+from pulsetrainer.cli.console import Screen, plain, say, shows_unicode
 from pulsetrainer.cli.next_step import as_options, with_files
 from pulsetrainer.cli.outputs import check_ending, check_keeps_inputs
 from pulsetrainer.errors import UsageError
@@ -146,7 +146,7 @@ class Job:
         if view.fits and shows_unicode():
             return view
         least = " x ".join(map(str, SMALLEST))
-        self.screen.note(f"no live view: it needs a terminal of {least} characters that shows Unicode")
+        say("note: ", f"no live view: it needs a terminal of {least} characters that shows Unicode")
         return None
 
     def load(self, path: Path, kind: type[K]) -> K:
@@ -265,4 +265,4 @@ class Job:
     def notes(self, lines: Sequence[str], lead: str = "note: ") -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(as_options(with_files(line, self._parameters)), lead)
+            say(lead, as_options(with_files(line, self._parameters)))

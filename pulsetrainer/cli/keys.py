@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.console import Screen, say
 from pulsetrainer.cli.live import LETTERS, Live, why_not
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.pulses import Shape
@@ -56,7 +56,7 @@ class Keys:
                 hint=f"{first}, or give the answers in a file: --answers answers.txt",
             )
         if "small" in dark:
-            screen.note(f"{dark}; there are no keys")
+            say("note: ", f"{dark}; there are no keys")
         if dark:
             return Steered(chosen, chosen.share_at)
         if isinstance(chosen, Blind):

@@ -158,8 +158,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     name, command = given.name or "", context.info_name or ""
     option = next((one for one in given.opts if one.startswith("-")), "")
     kinds, folder = HOLDS.get(name), error.path.parent
-    word = str(given.human_readable_name).partition("|")[0].rstrip(".")
-    word = word.upper() if word.islower() else word  # as in the help, where it is given no other
+    word = named(given).partition("|")[0].rstrip(".")
     if name == "inputs" and context.params.get("model"):  # then it is models on a run
         kinds, word = ("run",), "RUN.h5"
     typed = option or f"argument {word}"

@@ -1,4 +1,4 @@
-"""Options that several commands share, each with its help."""
+"""Arguments and options that several commands share, each with its help."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-from typer import BadParameter, CallbackParam, Option
+from typer import Argument, BadParameter, CallbackParam, Option
 
 from pulsetrainer.files.settings import SETTINGS, variable
 
@@ -50,7 +50,10 @@ def setting(key: str, name: str, words: str, **more: Any) -> Any:
     )
 
 
+AnyFile = Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")]
+Drive = Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")]
 Out = Annotated[Path, Option("-o", "--out", help="File to write.")]
+Report = Annotated[Path | None, Option(help="Report to write.")]
 Overwrite = Annotated[bool, Option("--overwrite", help="Replace an existing output.")]
 AsJson = Annotated[bool, Option("--json", help="One JSON object on stdout.")]
 Port = Annotated[

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Context
+from typer import Context
 
 import pulsetrainer as pt
 from pulsetrainer.cli import options
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 def play(
     context: Context,
-    drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
+    drive: options.Drive,
     out: options.Out,
     port: options.Port = None,
     repeats: Annotated[

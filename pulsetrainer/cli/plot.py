@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Context, Option
+from typer import Context, Option
 
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.cli.options import AnyFile, AsJson, Overwrite
 from pulsetrainer.cli.outputs import figure_format
 
 
 def plot(
     context: Context,
-    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    file: AnyFile,
     out: Annotated[
         Path | None, Option("-o", "--out", help="File to write; default: a PNG beside the file.")
     ] = None,

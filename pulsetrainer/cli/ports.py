@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.console import Screen, say
 from pulsetrainer.cli.options import AsJson
 
 _HEADS = {"device": "port", "vid_pid": "vendor:product", "is_device": "our device"}
@@ -30,4 +30,4 @@ def ports(json: AsJson = False) -> None:
                 row[-1] = "not known"
         screen.table("serial ports", [_HEADS.get(name, name) for name in names], rows)
     else:
-        screen.note("no serial port; plug the device in, or use the simulated one: --port bench:")
+        say("note: ", "no serial port; plug the device in, or use the simulated one: --port bench:")

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Context, Option
+from typer import Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
+from pulsetrainer.cli.options import AsJson, Drive, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
 
 
 def refine(
     context: Context,
-    drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
+    drive: Drive,
     out: Out,
     port: Port = None,
     passes: Annotated[

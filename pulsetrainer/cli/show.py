@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-from typer import Argument, Context
+from typer import Context
 
 import pulsetrainer as pt
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson
+from pulsetrainer.cli.options import AnyFile, AsJson
 from pulsetrainer.report.tables import picked
 
 
 def show(
     context: Context,
-    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    file: AnyFile,
     json: AsJson = False,
 ) -> None:
     """Show what is in a file.

@@ -50,7 +50,7 @@ _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the neare
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 
 
-def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
+def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
     """Return what the parser objects to in the ``words`` that were typed; None where it is not the parser."""
     explain = getattr(error, "format_message", None)
     if explain is None:

@@ -236,7 +236,6 @@ class Device:
         ArgumentError if the reference cannot be played: nothing has been armed then. DeviceError if the
         device cannot be talked to before it starts.
         """
-        step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
         wire = checked_wire(
             reference_A,
             rate_Hz,
@@ -250,7 +249,7 @@ class Device:
                 hint="10 gives 1000 samples a second",
             )
         self._check_heat(codes.CURRENT_UNIT_A * wire.astype(float), rate_Hz)
-        player = self._player_of(Feed(wire), step, decimation)
+        player = self._player_of(Feed(wire), rate_Hz, decimation)
         return self._perform(player, on_block, should_stop, keep=keep)
 
     def stream(
@@ -278,9 +277,9 @@ class Device:
                 f"no open-ended waves; they came with {'.'.join(map(str, _STREAMS_SINCE))}",
                 hint=FLASH,
             )
-        step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
-        feed, lead = Feed(), round(lead_s * rate_Hz)
-        player = self._player_of(feed, step, decimation)
+        feed = Feed()
+        player = self._player_of(feed, rate_Hz, decimation)
+        lead = round(lead_s * rate_Hz)
 
         def top_up() -> bool:
             if feed.ended or feed.size - player.played >= lead:
@@ -299,11 +298,11 @@ class Device:
         self._remember_heat(1.0)  # at most: should nobody be left to ask afterwards
         return self._perform(player, on_block, should_stop, keep=False, top_up=top_up)
 
-    def _player_of(self, feed: Feed, ticks: int, decimation: int) -> Player:
+    def _player_of(self, feed: Feed, rate_Hz: float, decimation: int) -> Player:
         return Player(
             self._exchange,
             feed,
-            ticks,
+            ticks_per_sample(rate_Hz, self.info.tick_rate_Hz),
             decimation,
             hello=self._hello,
             seen=self._seen,

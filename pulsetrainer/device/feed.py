@@ -32,11 +32,6 @@ class Feed:
             self.ended = True
             self.total, self.crc32 = self.size, zlib.crc32(self._held)
 
-    @property
-    def is_open(self) -> bool:
-        """Whether the device is not told beforehand how many samples come."""
-        return self.total == codes.WAVE_OPEN
-
     def append(self, samples: NDArray[np.int16]) -> None:
         """Put samples in behind the others."""
         with self._lock:

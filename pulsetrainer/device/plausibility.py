@@ -130,7 +130,7 @@ def _swings(force_N: FloatArray) -> bool:
 def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
     """The force lies outside what the currents of the last moments can leave."""
     least, most = _recent(time_s, current_A)
-    low = _LEAST_GAIN * np.interp(least, _CURRENT_A, _RISING_N) - _OFFSET_N
+    low = settled_least(least)
     high = _MOST_GAIN * np.interp(most, _CURRENT_A, _FALLING_N) + _OFFSET_N
     at = _first_outside(time_s, force_N, low, high)
     if at is None:

@@ -82,7 +82,7 @@ class Player:
         self._sent = 0
         self._crc = 0  # of what was sent
         self._checked = 0  # so many samples are known to have arrived as they were sent
-        self._told_end = not feed.is_open
+        self._told_end = feed.total != codes.WAVE_OPEN
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session: int | None = None  # known once the reference has arrived
         self._tick = 0  # latest known tick of the device

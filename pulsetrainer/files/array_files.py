@@ -22,10 +22,10 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.input_file import HDF5
 
 RATE_NAMES = frozenset(["fs", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "f_s"])
 STEP_NAMES = frozenset(["dt", "dt_s", "ts", "tinterval", "sample_time"])
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _KINDS = {"c": "complex numbers", "U": "text", "S": "text"}
 _WIDEST = 64  # columns that one matrix may give
 
@@ -74,7 +74,7 @@ def _read_mat(path: Path) -> Columns:
     with path.open("rb") as stream:
         head = stream.read(520)
     # version 7.3 is HDF5 behind a block of 512 bytes of text
-    if head[512:520] == _HDF5 or head[:8] == _HDF5:
+    if HDF5 in (head[512:520], head[:8]):
         return _read_mat_73(path)
     # half a second that text files need not wait for
     from scipy.io import loadmat  # noqa: PLC0415

@@ -75,7 +75,8 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
 def _check_new_file(path: Path, folder: Path) -> None:
     """Make a file beside the output and take it away: permissions tell nothing to root, nor of /proc."""
     try:
-        temporary, lease = _claim(path.resolve())
+        with _claimed(path.resolve()):
+            pass
     except OSError as error:
         if error.errno in _NO_ROOM:
             raise cannot_write(path, error) from error
@@ -83,9 +84,6 @@ def _check_new_file(path: Path, folder: Path) -> None:
             f"the output {path} cannot be written: no file can be made in {folder} ({error.strerror})",
             hint="write to another folder",
         ) from error
-    with contextlib.suppress(OSError):
-        temporary.unlink(missing_ok=True)
-    lease.end()
 
 
 @contextlib.contextmanager
@@ -103,24 +101,26 @@ def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     for leftover in _leftovers(target):
         sweep(leftover)
     try:
-        temporary, lease = _claim(target)
-        try:
+        with _claimed(target) as temporary:
             yield temporary
             _publish(temporary, target, overwrite=overwrite)
-        finally:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            lease.end()
     except OSError as error:
         raise cannot_write(path, error) from error
 
 
-def _claim(target: Path) -> tuple[Path, Lease]:
-    """Make a temporary file that no other process uses, with a lease on it."""
-    while True:
+@contextlib.contextmanager
+def _claimed(target: Path) -> Iterator[Path]:
+    """Give a new temporary file with a lease on it; what is left of it at the end is removed."""
+    lease: Lease | None = None
+    while lease is None:
         temporary = target.with_name(f".{_stem(target)}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
-        if lease := create_locked(temporary):
-            return temporary, lease
+        lease = create_locked(temporary)
+    try:
+        yield temporary
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        lease.end()
 
 
 def _stem(target: Path) -> str:

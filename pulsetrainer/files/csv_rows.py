@@ -44,7 +44,7 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece
     where the file cannot be read.
     """
     places = list(range(len(dialect.names)) if keep is None else keep)
-    reader = _Reader(path, dialect, frozenset(places))
+    reader = _Reader(path, dialect, frozenset(places), dialect.first_line)
     kept = _Kept(places)
     with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
         for _ in range(dialect.first_line - 1):
@@ -92,15 +92,12 @@ class _Reader:
     path: Path
     dialect: Dialect
     needed: frozenset[int]  # columns that must hold numbers
+    line: int  # of the next piece
     shifts: list[tuple[int, int]] = field(default_factory=list)
-    line: int = 0  # of the next piece
     row: int = 0
     point: str = ""  # where the first decimal point was, and the first decimal comma
     comma: str = ""
     misfit: str = ""
-
-    def __post_init__(self) -> None:
-        self.line = self.dialect.first_line
 
     def read(self, text: str) -> FloatArray:
         """Return the rows (n, columns) of the next piece; raises as ``parse``."""

@@ -145,8 +145,7 @@ def _scale(group: h5py.Group, axes: Axes, axis: str, length: int) -> h5py.Datase
 
 def _describe(dataset: h5py.Dataset, plan: FieldPlan, values: Mapping[str, Any]) -> None:
     """Write units and quantity, taken from a sibling field where the annotation says ``@name``."""
-    if plan.data is None:
-        return
+    assert plan.data is not None
     for name in ("units", "quantity"):
         text = getattr(plan.data, name)
         dataset.attrs[name] = clean(values[text[1:]] if text.startswith("@") else text)

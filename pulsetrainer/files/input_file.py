@@ -17,7 +17,7 @@ from pathlib import Path
 from pulsetrainer.errors import AbsentError, DamagedFileError, DataError, NotAnArtefactError, UsageError
 from pulsetrainer.files.checksum import is_as_written
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
+HDF5 = b"\x89HDF\r\n\x1a\n"
 _END = {0: 40, 1: 44, 2: 28, 3: 28}  # byte at which an HDF5 file says its length, by its version
 JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
 _FIRST_TEXT = re.compile(rb"GCOL.{28}([a-z]+)", re.DOTALL)  # our first text attribute is the kind
@@ -36,7 +36,7 @@ def check_artefact(path: Path | str) -> None:
     start = _first_bytes(Path(path))
     if not start:
         raise DamagedFileError(f"{path} is empty", path=path)
-    if not start.startswith((_HDF5, JOURNAL)):
+    if not start.startswith((HDF5, JOURNAL)):
         raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 
 
@@ -148,7 +148,7 @@ def is_sound(path: Path) -> bool:
     try:
         with path.open("rb") as stream:
             start = stream.read(64)
-        if not start.startswith(_HDF5):
+        if not start.startswith(HDF5):
             return bool(start) and (path.suffix != ".h5" or start.startswith(JOURNAL))
         end = _END.get(start[8], 0)
         whole = path.stat().st_size >= int.from_bytes(start[end : end + 8], "little")
@@ -174,7 +174,7 @@ def likely_kind(path: Path) -> str:
         return ""
     if start.startswith(JOURNAL):
         return "run"
-    found = _FIRST_TEXT.search(start) if start.startswith(_HDF5) else None
+    found = _FIRST_TEXT.search(start) if start.startswith(HDF5) else None
     return found[1].decode() if found else ""
 
 

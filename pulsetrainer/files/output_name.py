@@ -21,10 +21,11 @@ def is_no_file(path: Path) -> bool:
         return True
 
 
-def free(path: Path) -> Path:
-    """Return a path, or, where it is taken, a name like it that is not."""
+def free(path: Path, but: str = "") -> Path:
+    """Return a path, or, where it is taken or called ``but``, a name like it that is neither."""
     others = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in itertools.count(2))
-    return next(other for other in itertools.chain((path,), others) if not other.exists())
+    names = itertools.chain((path,), others)
+    return next(one for one in names if one.name != but and not one.exists())
 
 
 def check_artefact_name(path: Path, what: str, *, then: str = "") -> None:

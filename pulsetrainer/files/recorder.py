@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -154,13 +154,10 @@ class RunRecorder:
 
     def _check_space(self, count: int) -> None:
         """Raise DataError while there still is room for the file that the recording will become."""
-        if not hasattr(os, "statvfs"):
-            return
         try:
-            disk = os.statvfs(self.partial.parent)
+            free = shutil.disk_usage(self.partial.parent).free
         except OSError:
             return
-        free = disk.f_bavail * disk.f_frsize
         if free < _RESERVE_BYTES + (self.samples + 2 * count) * _BYTES_PER_SAMPLE:
             raise DataError(
                 f"the disk of {self.partial.parent} is full: {free} bytes are left",

@@ -15,13 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.artefacts.units import (
-    SECONDS,
-    check_unit,
-    counted,
-    same_units,
-    split_unit,
-)
+from pulsetrainer.artefacts.units import SECONDS, check_unit, counted, same_units, split_unit
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.time_column import (
@@ -103,8 +97,8 @@ def run_from_table(
         reference=None if reference is None else columns[reference],
         input_unit=_unit(table, input, input_unit, "`input_unit`"),
         output_unit=_unit(table, output, output_unit, "`output_unit`"),
-        input_quantity=split_unit(table.names[table.index(input)])[0],
-        output_quantity=split_unit(table.names[table.index(output)])[0],
+        input_quantity=split_unit(table.heading(input))[0],
+        output_quantity=split_unit(table.heading(output))[0],
         signal=table.path.name,
     )
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
@@ -139,7 +133,7 @@ def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -
     """Say which columns were taken for what, in which units, and of a text how it is laid out."""
     said = [time]
     for meaning, (name, unit) in meanings.items():
-        column = split_unit(table.names[table.index(name)])[0]
+        column = split_unit(table.heading(name))[0]
         said.append(f"{meaning} from {column} {'without unit' if unit == '1' else f'[{unit}]'}")
     layout = f"{table.layout}, numbers from {table.place(0)} on"
     return {"columns": ", ".join(said)} | ({"layout": layout} if table.layout else {})
@@ -216,7 +210,7 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     own = table.unit(column)
     if not own:
         return "1"
-    heading = table.names[table.index(column)]
+    heading = table.heading(column)
     if split_unit(heading)[1]:
         return check_unit(own, what, f"the heading {heading!r} of {table.path}")
     where = f"the line below the heading {heading!r} of {table.path}, which was taken for units,"
@@ -226,7 +220,7 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
 def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:
     """Say which headings name another unit than the one that was given: the numbers are not converted."""
     return [
-        f"the heading {table.names[table.index(column)]!r} of {table.path} says {own}, and `{meaning}_unit` "
+        f"the heading {table.heading(column)!r} of {table.path} says {own}, and `{meaning}_unit` "
         f"{unit}: taken as {unit}, not converted"
         for meaning, (column, unit) in meanings.items()
         if (own := table.unit(column)) and not same_units([own], [unit])
@@ -238,7 +232,7 @@ def _times_asked_for(table: Table, meanings: Mapping[str, tuple[str, str]]) -> l
     return [
         f"the column {heading!r} of {table.path} looks like the time, but was given as the {meaning}"
         for meaning, (column, _) in meanings.items()
-        if is_called_time(heading := table.names[table.index(column)])
+        if is_called_time(heading := table.heading(column))
         and bool(np.all(np.diff(table.columns[heading]) > 0))
     ]
 

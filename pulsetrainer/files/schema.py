@@ -100,8 +100,5 @@ def plan_of(cls: type) -> tuple[FieldPlan, ...]:
             attribute = next((mark for mark in marks if isinstance(mark, Attribute)), None)
         hint, optional = _without_none(hint)
         role, item = _role(hint, is_dataset=data is not None)
-        default = field.default
-        if field.default_factory is not MISSING:
-            default = field.default_factory()
-        plans.append(FieldPlan(field.name, role, item, optional, default, data, attribute))
+        plans.append(FieldPlan(field.name, role, item, optional, field.default, data, attribute))
     return tuple(plans)

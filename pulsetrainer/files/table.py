@@ -64,11 +64,15 @@ class Table:
 
         Raises as ``index``.
         """
-        return self.columns[self.names[self.index(name)]]
+        return self.columns[self.heading(name)]
+
+    def heading(self, name: str) -> str:
+        """Return the heading of a column as it stands in the file; raises as ``index``."""
+        return self.names[self.index(name)]
 
     def unit(self, name: str) -> str:
         """Return the unit of a column, empty where the header says none; raises as ``index``."""
-        return self.units.get(self.names[self.index(name)], "")
+        return self.units.get(self.heading(name), "")
 
     def place(self, row: int) -> str:
         """Say where a row is: the line of a text, the row of anything else."""

@@ -58,7 +58,7 @@ def time_of(
     if time is None:
         place = own_column(table, {table.index(name) for name in wanted})
         if place is None:
-            other = "other " * any(is_called_time(table.names[table.index(name)]) for name in wanted)
+            other = "other " * any(is_called_time(table.heading(name)) for name in wanted)
             lack = f"{table.path} has no {other}time column" + _unread(table)
             return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
         time = table.names[place]
@@ -67,7 +67,7 @@ def time_of(
         if counts and not time.endswith(_IN_SECONDS):
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
-    heading = table.names[table.index(time)]
+    heading = table.heading(time)
     unit, notes = _taken_as(table, heading)
     table = replace(table, units={**table.units, heading: unit}) if unit else table
     name = split_unit(heading)[0]
@@ -88,15 +88,12 @@ def time_of(
 
 def _unread(table: Table) -> str:
     """Say that the column of the date is text: how no time is written that can be read."""
-    name = next((own for own in table.names if own in table.text_names and _tells_when(own)), None)
+    texts = (own for own in table.names if own in table.text_names)
+    name = next((own for own in texts if is_called_time(own) or own.lower() in _DATES), None)
     if name is None or not table.shifts:
         return ""
     cell = cell_at(table.path, table.line_of(0), table.names.index(name))
     return f" (its {column_words(name)} could not be read as time: {cell!r})"
-
-
-def _tells_when(heading: str) -> bool:
-    return is_called_time(heading) or heading.lower() in _DATES
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
@@ -153,7 +150,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     """
     unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
-        below = not split_unit(table.names[table.index(name)])[1] and name in table.units
+        below = not split_unit(table.heading(name))[1] and name in table.units
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
             "or d" + ": the line below the headings was taken for units" * below,
@@ -220,7 +217,7 @@ def _unit_of_time(table: Table, name: str) -> str:
 
     ``min`` may be all of it, and ``d`` stands behind a name, where it is a unit of no other column.
     """
-    heading, unit = table.names[table.index(name)], table.unit(name)
+    heading, unit = table.heading(name), table.unit(name)
     bare, _, behind = heading.rpartition("_")
     alone = symbol_of(behind if bare.lower() in _TIME_NAMES else heading)
     return ("" if unit.lower() in _CLOCKS else unit) or (alone if alone in SECONDS else "")
@@ -228,7 +225,7 @@ def _unit_of_time(table: Table, name: str) -> str:
 
 def _unknown_unit(table: Table, name: str) -> str:
     """Return what the heading of a time says in the place of a unit, empty where it is a name alone."""
-    heading = table.names[table.index(name)]
+    heading = table.heading(name)
     bare, _, behind = heading.rpartition("_")
     return claimed_unit(heading) or (behind if bare.lower() in _TIME_NAMES else "")
 

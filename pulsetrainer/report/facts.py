@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -96,12 +96,6 @@ def loop_words(model: Model) -> str:
     if model.form == "signed":  # no loop of one direction fits
         return f"mostly {turns}" if turns[:1] == "c" else turns or "of either direction"
     return f"{trend}, {turns}" if turns else trend
-
-
-def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
-    """Between which temperatures the coil was, against that of calibration, K (n,)."""
-    low, high = (round(float(k), 1) + 0.0 for k in (min(kelvin), max(kelvin)))  # no -0.0
-    return f"{low:+.1f} to {high:+.1f} K against calibration, made up for"
 
 
 def minor_words(percent: float, switched_percent: float) -> str:
@@ -204,5 +198,8 @@ def _session(session: Session) -> dict[str, Any]:
 
 
 def coil_words(kelvin: FloatArray | None) -> dict[str, str]:
-    """Say how warm the coil was, where heat was tracked."""
-    return {} if kelvin is None or not kelvin.size else {"coil": warmth_words(kelvin)}
+    """Say between which temperatures the coil was, K (n,), where heat was tracked."""
+    if kelvin is None or not kelvin.size:
+        return {}
+    low, high = (round(float(k), 1) + 0.0 for k in (min(kelvin), max(kelvin)))  # no -0.0
+    return {"coil": f"{low:+.1f} to {high:+.1f} K against calibration, made up for"}

@@ -132,9 +132,8 @@ def quantity_of(unit: str, otherwise: str = "output") -> str:
 def density(panel: FigureBase, model: Model) -> None:
     """Draw the weights of a model over the half-plane alpha >= beta, cells that were not covered hatched."""
     edges = model.edges
-    n_h = edges.size - 1
-    rows, columns = np.tril_indices(n_h)  # the order of the cells: k = i (i + 1) / 2 + j
-    field = np.full((n_h, n_h), np.nan)
+    rows, columns = np.tril_indices(model.levels)  # the order of the cells: k = i (i + 1) / 2 + j
+    field = np.full((model.levels, model.levels), np.nan)
     field[rows, columns] = np.where(model.covered, model.weights, np.nan)
 
     axes = panel.add_subplot()
@@ -200,7 +199,7 @@ def _facts(model: Model, ends: str) -> str:
     """Return what stands in the empty half of the plane."""
     covered = int(np.count_nonzero(model.covered))
     lines = [
-        f"{model.edges.size - 1} levels, {model.weights.size} cells",
+        f"{model.levels} levels, {model.weights.size} cells",
         f"{covered} switched" + (",\nhatched: not switched" if covered < model.weights.size else ""),
         f"offset {model.offset:.4g} {shown(model.offset_unit)}".rstrip().replace("-", "−"),
     ]

@@ -20,6 +20,7 @@ from pulsetrainer.errors import DeviceError
 from pulsetrainer.resources import firmware_dir
 
 _NOT_IN_A_PORT = {"harness.c"}  # programs of their own
+_SOURCES = ("*.c", "*.S")
 # -ffp-contract=off: the plant promises the same bits everywhere.
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 _HOST = (*_FLAGS, "-D_XOPEN_SOURCE=700")
@@ -42,15 +43,8 @@ class _Image:
     def folders(self) -> tuple[str, ...]:
         return ("core", "hal", "plant", f"port/{self.port}")
 
-    def sources(self, root: Path) -> list[Path]:
-        """C and assembly files."""
-        return self._files(root, "*.c", "*.S")
-
-    def parts(self, root: Path) -> list[Path]:
-        """Everything that changes the result: sources, headers, the linker's script."""
-        return self._files(root, "*.c", "*.S", "*.h", "*.ld")
-
-    def _files(self, root: Path, *patterns: str) -> list[Path]:
+    def files(self, root: Path, *patterns: str) -> list[Path]:
+        """Return its files, each time in the same order."""
         found = (p for folder in self.folders for pattern in patterns for p in (root / folder).glob(pattern))
         return sorted(p for p in found if p.name not in _NOT_IN_A_PORT)
 
@@ -71,7 +65,7 @@ def find_compiler() -> list[str]:
 
 def _digest(root: Path, image: _Image) -> str:
     h = hashlib.sha256()
-    for path in image.parts(root):
+    for path in image.files(root, *_SOURCES, "*.h", "*.ld"):
         h.update(f"{path.relative_to(root)}\0{path.stat().st_size}\0".encode())
         h.update(path.read_bytes())
     h.update("\0".join(image.command + image.libraries).encode())
@@ -165,7 +159,7 @@ def _compiled(image: _Image) -> Path:
             return folder / name
         temporary = _place_in(folder)
     words = [*image.command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in image.folders)]
-    words += [*(str(p) for p in image.sources(root)), *image.libraries, "-o", temporary]
+    words += [*(str(p) for p in image.files(root, *_SOURCES)), *image.libraries, "-o", temporary]
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode != 0:

@@ -19,7 +19,7 @@ from store_examples import header
 import pulsetrainer.cli
 from program import PROGRAM
 from program import pulsetrainer as piped
-from pulsetrainer.cli.console import Screen, say
+from pulsetrainer.cli.console import say
 from pulsetrainer.files import store
 
 BIN = Path(sys.executable).parent
@@ -95,10 +95,9 @@ def test_a_note_is_folded_between_words(monkeypatch):
     """On a terminal; a warning is called one, and no note."""
     monkeypatch.setenv("COLUMNS", "40")
     monkeypatch.setattr(sys, "stderr", shown := _Terminal())
-    screen = Screen("identify", as_json=False)
     text = "the model leaves 0.9 % of the span (rms), 3 times the noise from sample to sample"
-    screen.note(text)
-    screen.note("the model expects large errors", "warning: ")
+    say("note: ", text)
+    say("warning: ", "the model expects large errors")
     lines = shown.getvalue().splitlines()
     assert max(map(len, lines)) <= 40
     assert " ".join(" ".join(lines[:-1]).split()) == f"note: {text}"

@@ -24,7 +24,7 @@ from pulsetrainer.artefacts import Evaluation, Profile, Recorded, Run, units
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels, planned
 from pulsetrainer.report.directions import directions, turns
-from pulsetrainer.report.facts import run_facts, warmth_words
+from pulsetrainer.report.facts import coil_words, run_facts
 from pulsetrainer.report.fewer_points import MOST_OF_A_LOOP, MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.results import identified
@@ -510,8 +510,8 @@ def test_the_main_figures_of_a_run_and_its_heat():
     assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
     alone = run_facts(Run(np.zeros(1), np.ones(1), np.ones(1)))
     assert (alone["samples"], alone["seconds"], alone["rate_Hz"], alone["gaps"]) == (1, None, None, None)
-    assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")
-    assert warmth_words([0.6, 0.5]).startswith("+0.5 to +0.6 K")  # no range upside down
+    assert coil_words(np.array([-0.04, 3.0, 5.06]))["coil"].startswith("+0.0 to +5.1 K")
+    assert coil_words(np.array([0.6, 0.5]))["coil"].startswith("+0.5 to +0.6 K")  # no range upside down
 
 
 def test_stamps_with_a_date_are_counted_from_the_first_sample():
