@@ -25,7 +25,7 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.dual import Dual, exchanged
 from pulsetrainer.core.edges import plane_for, thinned
 from pulsetrainer.core.equations import NormalEquations, parted_sums
-from pulsetrainer.core.identification import polarity_of
+from pulsetrainer.core.identification import correlation_of, polarity_of
 from pulsetrainer.core.initial_state import record_of
 from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
@@ -137,8 +137,14 @@ def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane)
 
     Over a loop that lags, an output that is late has a negative reversible part, the sum of the cells on the
     diagonal. No static loop has one, however its density changes sign; what is late is a matter of time.
+
+    An output that leads, such as the friction of something that slides, is late too if it is turned round.
+    So where the sign of the fit is against the trend, nothing is late: by so much no output is.
     """
-    turned, _ = levelled(records, polarity_of(records, plane))
+    sign = polarity_of(records, plane)
+    if sign * correlation_of(records) < 0.0:
+        return False
+    turned, _ = levelled(records, sign)
     whole = reduce(add, _parts(turned, folds, plane))
     masses = nnls.solve_signed(*smoothed(whole, _FIRST))
     operator = Preisach(plane, masses / plane.areas, whole.offset(masses), signed=True)

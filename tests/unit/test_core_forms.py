@@ -128,6 +128,24 @@ def test_a_loop_of_sharp_corners_that_leads_is_still_dual(seed):
     assert fit([(u, force)], 0.0, 1.0, 48, form="auto").form == "dual"
 
 
+@pytest.mark.parametrize("spring", [0.0, 0.04])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in range(1, 8))])
+def test_friction_without_a_stiff_spring_is_not_late(seed, spring):
+    """It leads, and hardly has a trend: turned round by the fit of its sign it would lag and be late."""
+    rng = np.random.default_rng([seed, 77])
+    turns = [0.0, 1.0, 0.0, *rng.uniform(0, 1, 60)]
+    u = np.interp(np.linspace(0, 62, SAMPLES), np.arange(63), turns)
+    force = np.zeros(u.size)  # Bouc and Wen
+    for k, step in enumerate(np.diff(u), start=1):
+        z = force[k - 1]
+        force[k] = z + 20.0 * step * (1.0 - z * z * (0.7 * np.sign(step * z) + 0.3))
+    y = force + spring * 20.0 * u
+    y += rng.normal(0.0, NOISE * np.ptp(y), u.size)
+    made = fit([(u, y)], 0.0, 1.0, 48, form="auto")
+    assert made.form in ("dual", "signed")
+    assert np.std(made.residuals[0]) < 0.03 * np.ptp(y)
+
+
 def test_a_dual_form_is_judged_by_what_it_was_not_fitted_to():
     """There it leaves 1.07 of the noise of these records in the mean; where it was fitted, 1.01."""
     left = []
