@@ -105,19 +105,27 @@ def test_records_shifted_against_each_other_are_fitted_with_an_offset_each(folde
     assert done.json["offsets"] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize(
-    ("name", "verdict"), [("mrdamper_ensaio1_1", "viscous"), ("mrdamper_ensaio9_1", "viscous"),
-                          ("pneu_oring_7bar", "unknown")],
-)  # fmt: skip
+@pytest.mark.parametrize("bar", [1, pytest.param(3, marks=pytest.mark.slow), 5,
+                                 pytest.param(7, marks=pytest.mark.slow)])  # fmt: skip
+def test_friction_of_a_seal_is_fitted_with_weights_of_either_sign(folder, bar):
+    """It follows the direction of motion and hardly has a trend; the direct form leaves 13 to 19 %."""
+    done = _identified(folder, f"pneu_oring_{bar}bar").json
+    print(bar, done["form"], done["fit_rms_percent"])
+    assert done["form"] == "signed"
+    assert done["fit_rms_percent"] <= 3.5
+    assert done["warning"] == ""
+
+
+@pytest.mark.parametrize("name", ["mrdamper_ensaio1_1", "mrdamper_ensaio9_1"])
 @pytest.mark.slow
-def test_a_force_that_follows_the_velocity_is_told(folder, name, verdict):
+def test_a_force_that_follows_the_velocity_is_told(folder, name):
     """Identify and diagnose say that a Preisach model in the displacement is the wrong one."""
     done = _identified(folder, name)
     screen = pulsetrainer(folder, "identify", f"{name}.h5", "-o", "again.h5", "--overwrite")
     tells(screen.out.splitlines()[0], "follows the velocity")  # above the figures
     tells(done.json["warning"], "follows the velocity")
     found = _diagnosed(folder, name, name)
-    assert found["verdict"] == verdict
+    assert found["verdict"] == "viscous"
     tells(found["evidence"][0], "follows the velocity")
 
 
