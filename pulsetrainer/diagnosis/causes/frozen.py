@@ -48,15 +48,14 @@ class Frozen(OfTheRecord):
             return None
         equal = min(step / (_EQUAL * noise), _MOST)
         least = max(_LEAST, 1 + int(np.ceil(np.log(_CHANCE / y.size) / np.log(equal)))) if equal else _LEAST
+        ends, breaks = (y.min(), y.max()), raw.beside_breaks(1)
+        long = [(k, last) for k, last in runs_of(np.diff(y) == 0.0) if last + 1 - k >= least]
         mask, jumps = np.zeros(y.size, dtype=np.bool_), []
-        breaks = raw.beside_breaks(1)
-        for begin, last in runs_of(np.diff(y) == 0.0):
-            held = slice(begin, last + 1)
-            jump = abs(float(y[last + 1] - y[last])) if last + 1 < y.size else 0.0
-            at_an_end = y[begin] in (y.min(), y.max())
-            if last + 1 - begin < least or at_an_end or np.ptp(u[held]) <= _MOVED * raw.reach:
+        for begin, last in long:
+            if y[begin] in ends or np.ptp(u[begin : last + 1]) <= _MOVED * raw.reach:
                 continue
             mask[begin + 1 : last + 1] = True
+            jump = abs(float(y[last + 1] - y[last])) if last + 1 < y.size else 0.0
             if jump > _JUMP * noise and not breaks[last : last + 2].any():
                 jumps.append(jump)
         if len(jumps) < _TIMES:
