@@ -34,6 +34,8 @@ extended: Extend the model now (pulsetrainer extend): it then predicts recording
     it is {either}.
 one rate: At one rate each of them is only a shape of the loop, which the device may have without any of
     them, and a model that was extended by one may do worse at other rates.
+no rest: All of this recording was run at one rate, without rests, where an effect that takes time looks like
+    a shape of the loop. So the extended model may do worse at other rates: compare both at those too.
 rate: If the samples were taken at a constant rate, no new recording is needed: read the table again with
     pulsetrainer import --rate HZ.
 faster: A time of about {tau} was found, at the fast end of what this recording shows (samples {apart} apart).
@@ -294,6 +296,8 @@ def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: 
     else:
         if not (faster_too and one.kind in _NOTHING_ELSE):
             yield ADVICE[one.kind]
+        if "one rate" in one.figures:
+            yield BESIDE["no rest"]
         if command == "correct" and one.kind not in _SAYS_CORRECT:
             yield BESIDE["also"]
     if faster_too:

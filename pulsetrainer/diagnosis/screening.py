@@ -277,7 +277,7 @@ def _blocks(fitted: Fitted, changed: Fitted) -> list[_Block]:
         (kind, values)
         for cause in library().values()
         if cause.stage != "record" and cause.id not in changed.names and (timed or not cause.needs_time)
-        for kind in cause.kinds()
+        for kind in cause.kinds(problem.frames)
         for values in kind.starts(problem.frames, parts)
     ]
     if not tried:

@@ -135,7 +135,7 @@ in step: it keeps step with the loops, and the model without it can follow most 
     device itself does. Loops at another rate would show which
 leaves more: it takes away less than it leaves, so it may be an error of the model itself
 own error: on a recording of one rate without rests it cannot be distinguished from an error of the model
-    itself, and what is left is nearly as large, or is more than noise
+    itself: there whatever takes time is a shape of the loop
 """)
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``advised.Bench.numbers``
 LACKS: Mapping[str, str] = {

@@ -28,11 +28,11 @@ def library() -> dict[str, Cause]:
     return {cause.id: cause for cause in sorted(found, key=lambda c: c.order)}
 
 
-def other_kinds(cause: Cause, frame: Frame) -> list[Cause]:
+def other_kinds(cause: Cause, frames: Sequence[Frame]) -> list[Cause]:
     """Return the other kinds of a cause with as many parameters; a finer formula is tried elsewhere."""
-    known = library()[cause.id].kinds() if cause.id in library() else ()
-    count = len(cause.quantities(frame))
-    return [one for one in known if one is not cause and len(one.quantities(frame)) == count]
+    known = library()[cause.id].kinds(frames) if cause.id in library() else ()
+    count = len(cause.quantities(frames[0]))
+    return [one for one in known if one is not cause and len(one.quantities(frames[0])) == count]
 
 
 def cause_named(name: str) -> Cause:

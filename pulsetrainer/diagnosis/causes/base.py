@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pulsetrainer.diagnosis.floor import Floor
 
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
+_WITHIN_STROKE = (0.02, 0.5)  # ranges that the input moves in a time: a level of the plane; a long stroke
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
 _LEVELS = 48  # of a hysteresis that fills in what the readings leave open
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
@@ -105,6 +106,11 @@ class Frame:
         turned = settled(self.input, _NO_PATH * self.reach, float(before[0]))
         self.remember("path", turned[-1:])
         return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
+
+    def is_within_stroke(self, time_s: float) -> bool:
+        """Whether the input on average moves, in such a time, through a share of its range as in one stroke."""
+        ranges = float(self.path[-1]) / self.reach * time_s / (self.input.size * self.dt_s)
+        return _WITHIN_STROKE[0] < ranges < _WITHIN_STROKE[1]
 
     def about(self, zero: float) -> Frame:
         """Return the frame with another zero of the output; the path is followed once for all of them."""
@@ -202,8 +208,8 @@ class Cause:
         """Return what a fit with all other causes leaves of a cause of stage ``record``."""
         return None
 
-    def kinds(self) -> tuple[Cause, ...]:
-        """Return the causes of this id to be tried: what a formula leaves open, one or the other."""
+    def kinds(self, frames: Sequence[Frame] = ()) -> tuple[Cause, ...]:
+        """Return the causes of this id that records may tell apart: what a formula leaves open."""
         return (self,)
 
     def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
@@ -275,6 +281,10 @@ class Cause:
         """Return whether its line is far above all others near it in what a model without it leaves."""
         return False
 
+    def shapes_strokes(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether at one rate it is the shape of single strokes: it forgets within one of them."""
+        return False
+
     def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether a fault goes in step with the input, as only what the device itself does should."""
         return False
@@ -339,7 +349,7 @@ class OfKinds(Cause):
         plain = self.kind == self.tried[0]
         return (self, *(type(self)(one) for one in self.tried[1:])) if plain else (self,)
 
-    def kinds(self) -> tuple[Cause, ...]:
+    def kinds(self, frames: Sequence[Frame] = ()) -> tuple[Cause, ...]:
         return self._kinds
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:

@@ -75,6 +75,9 @@ class Creep(OfKinds):
         other = {_EQUAL: _OTHER, _FIVE: _UNEVEN, _ALONE: _NEARLY}[self.kind]
         return [self._crept(y, values, frame, other)]
 
+    def shapes_strokes(self, values: Values, frames: Sequence[Frame]) -> bool:
+        return all(one.is_within_stroke(values[1]) for one in frames)
+
     def _crept(self, y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
         """Creep with a share ``middle`` of its amplitude in the middle time constant."""
         slow = middle * frame.low_pass(y, values[1], "creep")

@@ -70,7 +70,7 @@ class OffsetDrift(Cause):
         self._count = count
         self.relaxing = OffsetDrift(_RELAXING) if count == _PLAIN else self
 
-    def kinds(self) -> tuple[Cause, ...]:
+    def kinds(self, frames: Sequence[Frame] = ()) -> tuple[Cause, ...]:
         """A drift that relaxes early does not look like a parabola; other causes would be found instead."""
         return (self,) if self.relaxing is self else (self, self.relaxing)
 

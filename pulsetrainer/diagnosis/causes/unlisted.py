@@ -257,6 +257,9 @@ class Unlisted(Cause):
         """None: it is learned only when no listed cause explains what is left."""
         return []
 
+    def shapes_strokes(self, values: Values, frames: Sequence[Frame]) -> bool:
+        return any(all(one.is_within_stroke(tau) for one in frames) for tau in values[::KNOTS])
+
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         found = y
         for k, part in enumerate(self.parts):

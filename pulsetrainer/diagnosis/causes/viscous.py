@@ -1,7 +1,8 @@
 """the output has a part that follows the speed of the input: y + c LP(sgn(u') abs(u')^p; tau).
 
 The part may be proportional to the speed, as in a fluid (p = 1), to its root, as excess losses are (1/2), or
-to its square, as at an orifice (2). Each power is tried.
+to its square, as at an orifice (2). Each power is tried. Where the input has one speed all powers are alike, and only
+the first is.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, 
 _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
 _NO_SPEED = 1e-12  # ranges a second: an input at rest
+_PIECE = 0.05  # of the range: a way whose speed is one number
+_FEW, _MOST = 0.1, 0.9  # shares of all such pieces ...
+_ONE_SPEED = 1.5  # ... of which the faster is at most so many times as fast: one speed
 _LINEAR = 1.0  # power of the speed ...
 _ROOT = 0.5  # ... or this ...
 _SQUARE = 2.0  # ... or this
@@ -52,6 +56,9 @@ class Viscous(OfKinds):
         unit = coefficient.unit if self.kind == _LINEAR else f"{{y}} (s/{{u}})^{self.kind:g}"
         return replace(coefficient, unit=unit), *sampled((trailing,), frame)
 
+    def kinds(self, frames: Sequence[Frame] = ()) -> tuple[Cause, ...]:
+        return (self,) if frames and _have_one_speed(frames) else super().kinds()
+
     def restored(self, values: Values) -> tuple[Cause, Values]:
         """Return the cause and its parameters; models were once kept without the filter."""
         return super().restored(values if len(values) > 1 else (*values, 0.0))
@@ -75,3 +82,13 @@ class Viscous(OfKinds):
     def _power(self, speed: FloatArray) -> FloatArray:
         """Power of the speed (n,), of its sign."""
         return speed if self.kind == _LINEAR else np.sign(speed) * np.abs(speed) ** self.kind
+
+
+def _have_one_speed(frames: Sequence[Frame]) -> bool:
+    """Whether the input has one speed wherever it moves: then the powers differ at turns alone."""
+    took = [
+        np.diff(np.interp(np.arange(0.0, one.path[-1], _PIECE * one.reach), one.path, one.time_s))
+        for one in frames
+    ]
+    slow, fast = np.quantile(np.concatenate(took), [_MOST, _FEW])
+    return bool(slow < _ONE_SPEED * fast)

@@ -35,7 +35,7 @@ from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
 from pulsetrainer.diagnosis.finding import Finding
-from pulsetrainer.diagnosis.residual import LENGTH, RATES
+from pulsetrainer.diagnosis.residual import HOLDS, LENGTH, RATES
 from pulsetrainer.diagnosis.stages.begin import TWO_SIZES
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -155,9 +155,11 @@ def _after_verdict(state: State) -> Evidence:
 
 def _now_and_later(state: State, lacks: tuple[str, ...]) -> Evidence:
     """Extend the model; what the records lack comes after that."""
+    figures = {"one rate": 1.0} if {RATES, HOLDS} <= set(lacks) else {}
     if state.correctable:
-        return Evidence("extend, correct", names=(*state.correctable, *lacks))
-    return Evidence("extend, or late" if state.verdict == Delay.id else "extend", names=lacks)
+        return Evidence("extend, correct", figures=figures, names=(*state.correctable, *lacks))
+    kind = "extend, or late" if state.verdict == Delay.id else "extend"
+    return Evidence(kind, figures=figures, names=lacks)
 
 
 def _to_see_more(state: State) -> Evidence:

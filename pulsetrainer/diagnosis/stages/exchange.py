@@ -87,7 +87,7 @@ def _one_creep(state: State) -> State:
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
-    kinds = other_kinds(cause, problem.frames[0])
+    kinds = other_kinds(cause, problem.frames)
     # by its cause: an exchange before this one has moved all terms
     term = next(term for term in current.terms if term.cause is cause)
     late = [one for one in as_late(term, problem.frames[0]) if one.cause.id not in current.names]

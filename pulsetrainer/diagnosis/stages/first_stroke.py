@@ -43,7 +43,8 @@ def stage(state: State) -> State:
     again = _without(state, counts)
     if again is not None:
         return again
-    if state.jagged or (state.is_whole(state.current) and not _explains_only(state, second)):
+    may_be_one = _explains_only(state, second) or _changes_within(state, second)
+    if state.jagged or (state.is_whole(state.current) and not may_be_one):
         return state
     again = _without(state, second)
     return again if again is not None and again.is_whole(again.current) else state
@@ -65,6 +66,17 @@ def _explains_only(state: State, second: Sequence[int]) -> bool:
     bins = zip(state.problem.bins.number, second, strict=True)
     first = np.unique(np.concatenate([number[:until] for number, until in bins]))
     return float(gain[first[first >= 0]].sum()) > LIMITS.first_stroke_share * max(float(gain.sum()), 0.0)
+
+
+def _changes_within(state: State, second: Sequence[int]) -> bool:
+    """Whether a sudden change was found before the ``second`` stroke of a record."""
+    moments = [term.values[-1] for term in state.current.terms if term.cause.sudden]
+    return any(
+        frame.begin_s < moment < frame.begin_s + (until - 1) * frame.dt_s
+        for moment in moments
+        for frame, until in zip(state.problem.frames, second, strict=True)
+        if until
+    )
 
 
 def _without(state: State, counts: Sequence[int]) -> State | None:

@@ -48,7 +48,7 @@ def _of_best_kind(state: State, score: Score) -> Fitted:
     """Refit with the kind of a cause that fits best: linearised they can hardly be told apart."""
     best = _with(state, score.cause, score.start)
     values = best.terms[best.names.index(score.cause.id)].values
-    others = other_kinds(score.cause, state.problem.frames[0])
+    others = other_kinds(score.cause, state.problem.frames)
     return min([best, *(_with(state, kind, values) for kind in others)], key=lambda fitted: fitted.squares)
 
 

@@ -24,7 +24,8 @@ What speaks against a cause that was found is written beside it:
 - a gain that wears off with time, or with the way of the input, fits as well, so that it could equally be
   `accommodation`; or, against a step, whatever settles from the beginning of the record fits as well;
 - the record has one rate and no rest, where any cause looks like what a model lacks of the device; and what
-  is left is more than noise, or is slow and hardly smaller than what the cause explains.
+  is left is more than noise, or is slow and hardly smaller than what the cause explains; or the cause is a
+  memory that is forgotten within a stroke.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
     in_step = term.cause.in_step(term.values, state.problem.frames)
     if in_step and fall < LIMITS.free_of_weights * squares_added(state, term):  # the weights hold most of it
         yield IN_STEP
-    if _may_be_own_error(state, cause, fall):
+    if _may_be_own_error(state, term, fall):
         yield OWN_ERROR
     frame = state.problem.frames[0]
     at_end = term.at_bounds(frame)
@@ -164,15 +165,19 @@ def _added(state: State, term: Term) -> FloatArray:
     return state.problem.bins.average(added(current.simulator, current.terms, others))
 
 
-def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
+def _may_be_own_error(state: State, term: Term, fall: float) -> bool:
     """Whether a cause may be what the model lacks of the device, on records of one rate without rests.
 
     There, and in samples without time, every effect that takes time follows the input, and so does the error
-    of the model. The fall of the squares must be much larger than what is left, and what is left be noise.
+    of the model. The fall of the squares must be much larger than what is left, and what is left be noise. A
+    memory that is forgotten within a stroke is in doubt anyway: it is there a shape of the loop.
     """
+    cause = term.cause
     several = residual.TIME not in state.lacks and not {residual.RATES, residual.HOLDS} <= set(state.lacks)
     if cause.by_contrast or several:
         return False
+    if term.cause.shapes_strokes(term.values, state.problem.frames):
+        return True
     if not state.is_whole(state.current):
         return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
     slow = state.floor.slow > LIMITS.slow_noise  # noise from sample to sample is no error of a model
