@@ -248,3 +248,38 @@ def test_one_of_two_records_that_is_turned_over_is_told():
     assert (found.verdict, [one.cause for one in found.found]) == ("condition-change", ["condition-change"])
     assert "record 2: the force falls where the model rises" in found.evidence[0]
     assert "different conditions" in found.next_experiment
+
+
+def _at_one_rate(shown, speed, seed=8):
+    """A run at 100 Hz through drawn turns at one rate, without a rest; ``shown(u, dt_s)`` is the output."""
+    rng = np.random.default_rng(seed)
+    turns = [0.0, 1.0, 0.0, *rng.uniform(0.0, 1.0, 45), 0.0]
+    times = np.cumsum([0.0, *(np.abs(np.diff(turns)) / speed)])
+    dt_s = 0.01 / foreign.FINER
+    u = np.interp(np.arange(0.0, times[-1], dt_s), times, turns)
+    y = shown(u, dt_s)[:: foreign.FINER]
+    y = y + 0.003 * np.ptp(y) * rng.standard_normal(y.size)
+    return pt.Run(time_s=0.01 * np.arange(y.size), input=u[:: foreign.FINER], output=y)
+
+
+@pytest.mark.slow
+def test_a_force_by_speed_that_one_rate_shows_holds_at_three_times_that_rate():
+    """The powers of the speed fit alike there; the plainest is meant."""
+
+    def shown(u, dt_s):
+        return foreign.plays(u, np.random.default_rng(3)) + 0.012 * np.gradient(u, dt_s)
+
+    seen, fast = _at_one_rate(shown, 0.8), _at_one_rate(shown, 2.4, seed=9)
+    model = pt.identify(seen)
+    found = pt.diagnose([seen], model)
+    assert found.verdict == "viscous"
+    plain, extended = (one.rms for one in pt.evaluate(fast, [model, pt.extend(model, found)]).models)
+    assert extended < 0.5 * plain
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [5, 6, 9])
+def test_at_one_rate_no_memory_in_time_is_named_for_a_device_without(seed):
+    """A Jiles-Atherton device has loops of another shape than a Preisach model, which look like creep there."""
+    seen = _at_one_rate(lambda u, _: foreign.jiles_atherton(u, np.random.default_rng(seed)), 0.6)
+    assert pt.diagnose([seen], pt.identify(seen)).verdict in ("unknown", "inconclusive")

@@ -84,6 +84,19 @@ def test_creep_of_one_time_constant_or_of_five():
     assert CAUSE["creep"].restored((wide.constants()[0][1], a, tau))[0].kind == wide.kind
 
 
+@pytest.mark.parametrize("second", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("faster", "kinds"), [(1.0, 1), (1.4, 1), (1.6, 3), (10.0, 3)])
+def test_powers_of_the_speed_are_tried_where_there_are_several_speeds(second, faster, kinds):
+    """Rests are no speed: at one speed the powers differ at turns alone, and only the first is tried."""
+    turns = np.cumsum([0.0, *np.repeat([1.0, 1.0 / faster], 6)])
+    turns[7:] += 0.3
+    times, held = np.insert(turns, 7, turns[6] + 0.3), np.insert(np.arange(13) % 2, 7, 0)
+    t = np.arange(0.0, times[-1], 2e-3)
+    frame = Frame(2e-3 * second, 40.0 * np.interp(t, times, held), 1.0, 40.0)
+    assert len(CAUSE["viscous"].kinds([frame])) == kinds
+    assert len(CAUSE["viscous"].kinds()) == 3
+
+
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
 def test_a_force_follows_the_speed_its_root_or_its_square(power):
     """Down as strongly as up, the same in other units, and kept in a model."""

@@ -1126,6 +1126,22 @@ def test_what_only_imitates_a_force_by_speed_predicts_little(monkeypatch, name, 
     assert found.in_doubt is doubted
 
 
+@pytest.mark.parametrize(("ranges", "doubted"), [(0.019, False), (0.021, True), (0.49, True), (0.51, False)])
+def test_at_one_rate_without_rests_a_memory_of_less_than_a_stroke_is_in_doubt(monkeypatch, ranges, doubted):
+    """It may be a shape of the loop, however much it explains; with rests or rates it is not."""
+    u = np.abs((np.arange(20_001) * 1e-3 / 2.0 + 1.0) % 2.0 - 1.0)  # half a range a second
+    frame = Frame(1e-3, u, 1.0, 1.0)
+    fitted = _fit(120.0, "creep")
+    terms = tuple(replace(term, values=(0.2, ranges / 0.5)) for term in fitted.terms)
+    for lacks, expected in ((POOR, doubted), ((residual.RATES,), False), ((residual.HOLDS,), False)):
+        state = _state(
+            replace(fitted, terms=terms),
+            lacks=lacks,
+            problem=SimpleNamespace(**{**vars(PROBLEM), "frames": (frame, frame)}),
+        )
+        assert rivals._may_be_own_error(state, terms[0], 9000.0) is expected
+
+
 @pytest.mark.parametrize(
     ("name", "lacks", "left", "squares", "doubted"),
     [
@@ -1503,6 +1519,7 @@ def test_what_the_records_show_is_cited_as_seen(monkeypatch):
 
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
 CLIPPED = Firing("clipped-input", "gate", 0.8, "{u}")
+DOUBTED = _finding("creep", 9.0, doubts=("own error",))
 
 
 @pytest.mark.parametrize(
@@ -1530,7 +1547,8 @@ CLIPPED = Firing("clipped-input", "gate", 0.8, "{u}")
         ({"verdict": "creep", "lacks": ("rates",)}, "lacks"),
         ({"verdict": "creep", "lacks": ("rates",), "extended": "a model"}, "extend"),
         ({"verdict": "none", "lacks": ("rates",)}, "none"),
-        ({"verdict": "unknown", "lacks": ("rates",)}, "lacks"),
+        ({"verdict": "unknown", "lacks": ("rates",)}, "unknown"),  # ... and beside it what the records lack
+        ({"verdict": "unknown", "lacks": ("rates",), "findings": (DOUBTED,)}, "lacks"),
         ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),
         ({"findings": (TIED,), "verdict": "unknown", "evidence": (Evidence("zero wanders"),)}, "keep steady"),
         ({"findings": (TIED,), "verdict": "step", "evidence": (Evidence("zero wanders"),)}, "tied"),

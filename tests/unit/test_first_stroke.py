@@ -18,6 +18,9 @@ from pulsetrainer.core.initial_state import (
     record_of,
     second_stroke,
 )
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.stages import first_stroke
 
 DT_S = 0.02
@@ -78,6 +81,17 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
     u, y = _record(cycled=True, down=down)
     assert known_from(u, 0.0, 5.0, y) == 0
     assert first_stroke_words(u, y, 0.0, 5.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("moment", "within"), [(0.0, False), (0.05, True), (1.9, True), (2.1, False), (12.05, True)]
+)
+def test_a_step_within_a_first_stroke_may_be_that_stroke(moment, within):
+    """A record that begins at 10 s counts as well; other causes have no moment."""
+    frames = [Frame(0.1, np.zeros(100), 1.0, 1.0, begin_s=begin) for begin in (0.0, 10.0, 12.0)]
+    terms = [Term(library()["step"], (0.1, 0.0, moment)), Term(library()["creep"], (0.1, 1.0))]
+    state = SimpleNamespace(current=SimpleNamespace(terms=terms), problem=SimpleNamespace(frames=frames))
+    assert first_stroke._changes_within(state, [21, 0, 5]) is within
 
 
 ONCE = (0.0, 5.0, 0.0, 4.0, 1.0, 3.5, 1.5, 4.2, 0.8, 3.0, 2.0, 4.0, 0.6, 3.2, 1.1)

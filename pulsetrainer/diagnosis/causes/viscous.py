@@ -19,8 +19,8 @@ _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
 _NO_SPEED = 1e-12  # ranges a second: an input at rest
 _PIECE = 0.05  # of the range: a way whose speed is one number
-_FEW, _MOST = 0.1, 0.9  # shares of all such pieces ...
-_ONE_SPEED = 1.5  # ... of which the faster is at most so many times as fast: one speed
+_FEW, _MOST = 0.1, 0.9  # shares of all such pieces: of those between ...
+_ONE_SPEED = 1.5  # ... the fastest is at most so many times as fast as the slowest: one speed
 _LINEAR = 1.0  # power of the speed ...
 _ROOT = 0.5  # ... or this ...
 _SQUARE = 2.0  # ... or this
@@ -86,9 +86,13 @@ class Viscous(OfKinds):
 
 def _have_one_speed(frames: Sequence[Frame]) -> bool:
     """Whether the input has one speed wherever it moves: then the powers differ at turns alone."""
-    took = [
-        np.diff(np.interp(np.arange(0.0, one.path[-1], _PIECE * one.reach), one.path, one.time_s))
-        for one in frames
-    ]
-    slow, fast = np.quantile(np.concatenate(took), [_MOST, _FEW])
+    took = np.concatenate(
+        [
+            np.diff(np.interp(np.arange(0.0, one.path[-1], _PIECE * one.reach), one.path, one.time_s))
+            for one in frames
+        ]
+    )
+    if not took.size:
+        return False
+    fast, slow = np.quantile(took, [_FEW, _MOST])
     return bool(slow < _ONE_SPEED * fast)

@@ -138,8 +138,8 @@ def _at_the_mains(tied: Finding) -> dict[str, float]:
 
 def _after_verdict(state: State) -> Evidence:
     if state.verdict in ("unknown", "none"):
-        kind = "lacks" if state.lacks and state.verdict == "unknown" else state.verdict
-        return Evidence(kind, names=state.lacks)
+        doubted = state.verdict == "unknown" and any(one.found for one in state.findings)
+        return Evidence("lacks" if state.lacks and doubted else state.verdict, names=state.lacks)
     if state.verdict in state.correctable:
         device = any(one.found and one.cause.lasting and not one.in_doubt for one in state.findings)
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
