@@ -271,7 +271,7 @@ class Thresholds:
     hold_within: float = 0.02  # ... in which the input stays within this share of its range ...
     hold_noise: float = 10.0  # ... or within so many standard deviations of its noise
     short_s: float = 20.0  # a shorter record is called short
-    given_worse: float = 2.5  # times what refitted weights leave: more is reported of the model as given
+    given_worse: float = 1.8  # times what refitted weights leave: more, if it matters, is reported of it
     no_turn: float = 0.01  # of the range of the input: half the size of the smallest reversal that is a turn
     worth_recording: float = 1.5  # times the difference seen here: an experiment below is not advised
     first_stroke_most: float = 0.25  # of a record: a longer piece is not left out as a first stroke

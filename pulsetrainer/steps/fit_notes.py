@@ -63,14 +63,24 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
     return [f"{wild} left out of the fit ({100 * count / size:.2g} % of the record)"]
 
 
+def leaves_much(fitted: Fitted) -> bool:
+    """Whether a fit leaves many times the noise, and enough to matter."""
+    return fitted.misfit > MUCH and _times(fitted) > MANY
+
+
+def _times(fitted: Fitted) -> float:
+    """What a fit leaves, as a multiple of the noise from sample to sample; infinite without any."""
+    residuals = fitted.counted(fitted.residuals)
+    left, noise = root_mean_square(np.concatenate(residuals)), max(white(one) for one in residuals)
+    return left / noise if noise > 0.0 else float("inf")
+
+
 def of_rest(fitted: Fitted) -> list[str]:
     """Say that a fit leaves many times the noise, and enough to matter; nothing where it does not."""
-    residuals, output = fitted.counted(fitted.residuals), fitted.counted_output
-    left, noise = root_mean_square(np.concatenate(residuals)), max(white(one) for one in residuals)
-    share = left / float(np.ptp(output))
-    if share <= MUCH or left <= MANY * noise:
+    if not leaves_much(fitted):
         return []
-    times = f"{left / noise:.0f} times" if left < _UNCOUNTED * noise else "far more than"
+    count, share = _times(fitted), fitted.misfit
+    times = f"{count:.0f} times" if count < _UNCOUNTED else "far more than"
     found = f"the model leaves {100 * share:.1f} % of the span (rms), {times} the noise from sample to sample"
     return [f"{found}: pulsetrainer diagnose shows what it misses"]
 

@@ -17,11 +17,11 @@ from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
-from pulsetrainer.core.initial_state import counts_from, first_stroke_words
+from pulsetrainer.core.initial_state import first_stroke_words, left_out_words
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.steps import fit_notes
+from pulsetrainer.steps import first_strokes, fit_notes
 from pulsetrainer.steps.arguments import EXCITATIONS, check_levels, named, several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
@@ -130,14 +130,20 @@ def identify(
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
     sure = [t.wild_input | m for t, m in zip(tamed, masked, strict=True)]
-    fitted, measured, masks = _without_wild(
-        on, reach, measured, sure, [t.wild_output for t in tamed], [part.output for part in raw]
-    )
+    doubtful, as_read = [t.wild_output for t in tamed], [part.output for part in raw]
+    fitted, mended, masks = _without_wild(on, reach, measured, sure, doubtful, as_read)
+    left_out = first_strokes.apart(on, fitted, mended, sure) if fit_notes.leaves_much(fitted) else []
+    if any(left_out):
+        later = first_strokes.of_later(on, left_out)
+        fitted, mended, masks = _without_wild(later, reach, measured, sure, doubtful, as_read)
+    measured = mended
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
     strokes = [first_stroke_words(run.input, run.output, operator.low, operator.high) for run in measured]
+    if any(left_out):
+        strokes = [left_out_words(n) if n else said for n, said in zip(left_out, strokes, strict=True)]
     notes += [f"{title}: {words}" for title, words in zip(titles, strokes, strict=True) if words]
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
@@ -391,7 +397,7 @@ def _model(
     measured = fitted.counted_output
     errors = metrics.prediction(measured, np.concatenate(fitted.counted(fitted.predicted)))
     thinned = slice(
-        counts_from(first.input, operator.low, operator.high, first.output),
+        int(np.argmax(record.counts)),
         None,
         max(1, first.input.size // TRACE_SAMPLES),
     )

@@ -139,7 +139,8 @@ def _is_one_stroke(u: FloatArray) -> bool:
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
     """Where nothing was found, say if the model as given leaves much more than refitted weights do."""
     refitted = state.scale.span * state.baseline.rms
-    if state.verdict not in _NOTHING or _left_by_given(state, judged) <= LIMITS.given_worse * refitted:
+    small = max(LIMITS.given_worse * refitted, LIMITS.matters * float(np.ptp(judged.measured)))
+    if state.verdict not in _NOTHING or _left_by_given(state, judged) <= small:
         return []
     left = {"given": root_mean_square(judged.measured - judged.predicted), "refitted": refitted}
     percent = PERCENT / float(np.ptp(judged.measured))
