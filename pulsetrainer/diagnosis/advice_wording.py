@@ -282,26 +282,30 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
 def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: bool) -> Iterator[str]:
     """Yield the sentences of an advice, of so many names of which some are faults of the measurement."""
     if one.kind in _TIED:
-        if "mains" in one.figures:
-            yield BESIDE["mains"]
-        if command == "extend":
-            yield BESIDE["extended"]
-        if "one rate" in one.figures:
-            yield BESIDE["one rate"]
-        if command == "correct":
-            yield BESIDE["whichever" if faults == names else "first"]
+        yield from _of_ties(one, command, faults, names)
+    elif not (faster_too and one.kind in _NOTHING_ELSE):
         yield ADVICE[one.kind]
-        if 0 < faults < names:
-            yield BESIDE["known"]
-    else:
-        if not (faster_too and one.kind in _NOTHING_ELSE):
-            yield ADVICE[one.kind]
         if "one rate" in one.figures:
             yield BESIDE["no rest"]
-        if command == "correct" and one.kind not in _SAYS_CORRECT:
-            yield BESIDE["also"]
+    if command == "correct" and one.kind not in (*_TIED, *_SAYS_CORRECT):
+        yield BESIDE["also"]
     if faster_too:
         yield BESIDE["faster"]
+
+
+def _of_ties(one: Evidence, command: str, faults: int, names: int) -> Iterator[str]:
+    """Yield the sentences of an advice about causes that are tied."""
+    if "mains" in one.figures:
+        yield BESIDE["mains"]
+    if command == "extend":
+        yield BESIDE["extended"]
+    if "one rate" in one.figures:
+        yield BESIDE["one rate"]
+    if command == "correct":
+        yield BESIDE["whichever" if faults == names else "first"]
+    yield ADVICE[one.kind]
+    if 0 < faults < names:
+        yield BESIDE["known"]
 
 
 def _with_what_lacks(told: str, lacked: Sequence[str]) -> str:

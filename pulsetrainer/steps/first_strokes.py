@@ -1,4 +1,4 @@
-"""First strokes that no later one repeats, and that keep a model from the rest: of a device never cycled before.
+"""First strokes of devices that were never cycled before: no later one repeats them, and a model misses them.
 
 Where several later strokes from the same end are alike, the record alone shows the first one
 (``core.initial_state``). Elsewhere a fit shows it: without the first stroke it leaves far less of the rest.

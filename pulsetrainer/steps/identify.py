@@ -130,20 +130,15 @@ def identify(
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
     sure = [t.wild_input | m for t, m in zip(tamed, masked, strict=True)]
-    doubtful, as_read = [t.wild_output for t in tamed], [part.output for part in raw]
-    fitted, mended, masks = _without_wild(on, reach, measured, sure, doubtful, as_read)
-    left_out = first_strokes.apart(on, fitted, mended, sure) if fit_notes.leaves_much(fitted) else []
-    if any(left_out):
-        later = first_strokes.of_later(on, left_out)
-        fitted, mended, masks = _without_wild(later, reach, measured, sure, doubtful, as_read)
-    measured = mended
+    fitted, measured, masks, left_out = _to_what_counts(
+        on, reach, measured, sure, [t.wild_output for t in tamed], [part.output for part in raw]
+    )
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
     strokes = [first_stroke_words(run.input, run.output, operator.low, operator.high) for run in measured]
-    if any(left_out):
-        strokes = [left_out_words(n) if n else said for n, said in zip(left_out, strokes, strict=True)]
+    strokes = [left_out_words(n) if n else said for n, said in zip(left_out, strokes, strict=True)]
     notes += [f"{title}: {words}" for title, words in zip(titles, strokes, strict=True) if words]
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
@@ -172,6 +167,18 @@ def identify(
         "wild_output": raw[0].output[first] if first.any() else None,
     }
     return _model(fitted, measured, covered, ensemble, cleaned, said)
+
+
+def _to_what_counts(
+    on: Callable[..., Fitted], reach: tuple[float, float], runs: list[Run], *rest: Sequence[Any]
+) -> tuple[Fitted, list[Run], list[BoolArray], list[int]]:
+    """Fit without wild samples, and without first strokes (k samples) that keep it from what comes later."""
+    fitted, mended, masks = _without_wild(on, reach, runs, *rest)
+    left_out = first_strokes.apart(on, fitted, mended, rest[0]) if fit_notes.leaves_much(fitted) else []
+    if any(left_out):
+        later = first_strokes.of_later(on, left_out)
+        fitted, mended, masks = _without_wild(later, reach, runs, *rest)
+    return fitted, mended, masks, left_out or [0] * len(runs)
 
 
 def _without_wild(

@@ -280,6 +280,6 @@ def test_a_force_by_speed_that_one_rate_shows_holds_at_three_times_that_rate():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 6, 9])
 def test_at_one_rate_no_memory_in_time_is_named_for_a_device_without(seed):
-    """A Jiles-Atherton device has loops of another shape than a Preisach model, which look like creep there."""
+    """The loops of a Jiles-Atherton device have a shape that looks like creep there."""
     seen = _at_one_rate(lambda u, _: foreign.jiles_atherton(u, np.random.default_rng(seed)), 0.6)
     assert pt.diagnose([seen], pt.identify(seen)).verdict in ("unknown", "inconclusive")

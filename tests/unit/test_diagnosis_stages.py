@@ -2321,7 +2321,8 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
 
 @pytest.mark.parametrize("verdict", ["none", "unknown", "inconclusive", "creep"])
 @pytest.mark.parametrize(
-    ("times", "refitted", "worse"), [(1.75, 0.04, False), (1.85, 0.04, True), (4.9, 0.01, False), (5.1, 0.01, True)]
+    ("times", "refitted", "worse"),
+    [(1.75, 0.04, False), (1.85, 0.04, True), (4.9, 0.01, False), (5.1, 0.01, True)],
 )
 def test_a_model_that_does_not_carry_over_is_told_where_nothing_else_is(
     monkeypatch, verdict, times, refitted, worse

@@ -1,8 +1,8 @@
 """the output has a part that follows the speed of the input: y + c LP(sgn(u') abs(u')^p; tau).
 
 The part may be proportional to the speed, as in a fluid (p = 1), to its root, as excess losses are (1/2), or
-to its square, as at an orifice (2). Each power is tried. Where the input has one speed all powers are alike, and only
-the first is.
+to its square, as at an orifice (2). Each power is tried. Where the input has one speed all powers are alike,
+and only the first is.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
 _NO_SPEED = 1e-12  # ranges a second: an input at rest
 _PIECE = 0.05  # of the range: a way whose speed is one number
-_FEW, _MOST = 0.1, 0.9  # shares of all such pieces: of those between ...
-_ONE_SPEED = 1.5  # ... the fastest is at most so many times as fast as the slowest: one speed
+_FEW = 0.1  # of all such pieces: the quickest ...
+_MOST = 0.9  # ... to the slowest that count ...
+_ONE_SPEED = 1.5  # ... where the latter take less than so many times as long, there is one speed
 _LINEAR = 1.0  # power of the speed ...
 _ROOT = 0.5  # ... or this ...
 _SQUARE = 2.0  # ... or this
