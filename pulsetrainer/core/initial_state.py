@@ -125,9 +125,11 @@ def _is_apart(
 
 
 def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
-    """First sample (n,) at an end of [low, high] again, of a record that begins at one; 0 for none."""
-    away, back, reach = _from_its_end(inputs, *_reached(inputs, low, high))
-    return 0 if away[0] > NEAR * reach else _second_stroke(away, back, reach)
+    """First sample (n,) at an end of [low, high] again, after the first stroke from one; 0 for none."""
+    begin = known_from(inputs, low, high)
+    away, back, reach = _from_its_end(inputs[begin:], *_reached(inputs, low, high))
+    second = _second_stroke(away, back, reach)
+    return begin + second if second else 0
 
 
 def _from_its_end(inputs: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray, float]:
