@@ -266,7 +266,7 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
         lacked=listed(lacked, bench.numbers()),
-        either=" or ".join(names),
+        either=joined(names, "or"),
         removed=listed(removed, numbers),
         faults=listed(faults, numbers),
         experiment=EXPERIMENTS[played].format(**numbers),

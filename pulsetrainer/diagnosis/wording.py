@@ -195,7 +195,7 @@ def listed(names: Sequence[str], numbers: Mapping[str, str]) -> str:
     return joined([LACKS[name].format(**numbers) if name in LACKS else name for name in names])
 
 
-def joined(words: Sequence[str]) -> str:
+def joined(words: Sequence[str], word: str = "and") -> str:
     """Return ``a, b and c``."""
     *rest, last = words or [""]
-    return f"{', '.join(rest)} and {last}" if rest else last
+    return f"{', '.join(rest)} {word} {last}" if rest else last
