@@ -31,7 +31,7 @@ _BARE_SYMBOLS = """
 # of two letters and more, may be all of it
 _SUFFIXES = """
     s ms us µs ns min h A mA uA nA pA kA V mV uV kV N mN uN nN cN kN Nm mNm T mT m cm mm um µm nm Pa kPa MPa
-    GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm
+    GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm Wb mWb uWb Vs mVs ppm m3/m3
     deg rad C °C degC K Hz kHz W g kg % percent permille Ah mAh Wh mWh kWh
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
     l/h l/min l/s L/h L/min L/s ml/min m3/h m3/s U/min

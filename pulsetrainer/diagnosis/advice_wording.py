@@ -20,6 +20,8 @@ from pulsetrainer.diagnosis.wording import LACKS, figure, joined, listed
 BESIDE = sentences("""\
 again: record {output} and {input} again: first a loop of the {input} from {low} to {high} and back, then
     {missing}. {command} Then diagnose the new recording together with these, with the same model.
+together: Before that: if you have the recordings that the model was identified from, diagnose them together
+    with these (pulsetrainer diagnose takes several). That may be enough.
 keep: Use the model as it is: nothing that was found calls for another one.
 known: If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up),
     record the same again, and identify the model from that.
@@ -289,6 +291,8 @@ def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: 
             yield BESIDE["no rest"]
     if command == "correct" and one.kind not in (*_TIED, *_SAYS_CORRECT):
         yield BESIDE["also"]
+    if "together" in one.figures:
+        yield BESIDE["together"]
     if faster_too:
         yield BESIDE["faster"]
 

@@ -499,6 +499,37 @@ def test_a_recorder_that_repeats_a_value_is_frozen(step):
     assert not _fires("frozen", _frozen(SWINGS, y, [(500, 560)]), SWINGS)
 
 
+def _repeated(y, share, seed=11):
+    """The same output of a recorder that gives a share of its values twice or more."""
+    again = np.random.default_rng(seed).random(y.size) < share
+    again[0] = False
+    return y[np.maximum.accumulate(np.where(again, 0, np.arange(y.size)))], again
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-5])
+@pytest.mark.parametrize(("share", "fires"), [(0.015, False), (0.1, True), (0.3, True), (0.6, True)])
+def test_values_that_are_repeated_here_and_there_are_frozen(step, share, fires):
+    """All repeats are masked but those at the ends of the output; a record as read has none."""
+    y, again = _repeated(np.round(NOISY / step) * step if step else NOISY, share)
+    firing = CAUSE["frozen"].gate(_raw(y, SWINGS))
+    assert (firing is not None) is fires
+    if firing is not None:
+        inside = (y != y.min()) & (y != y.max())
+        assert np.all(firing.mask[inside & again])
+        assert np.count_nonzero(firing.mask & ~again) <= 0.002 * y.size  # equal by chance
+        assert firing.value > 0.0
+
+
+def test_a_slow_recorder_or_coarse_steps_are_not_frozen():
+    """A table twice as fast as the recorder has each value twice; steps repeat values where noise is low."""
+    for times in (2, 3):
+        held = np.repeat(NOISY[::times], times)[: NOISY.size]
+        assert not _fires("frozen", held, SWINGS)
+    quiet = np.where(SWINGS > 0.0, NOISY, np.round(SWINGS / 0.02) * 0.02)
+    assert not _fires("frozen", quiet, SWINGS)
+    assert not _fires("frozen", np.round(NOISY / 0.01) * 0.01, SWINGS)
+
+
 def test_what_may_repeat_a_value_is_not_frozen():
     """A rest, a rail, hardly any noise, noise that is none near zero, coarse steps, a jump of the input."""
     resting = np.where(np.arange(4000) // 100 % 5 == 0, 0.3, SWINGS)

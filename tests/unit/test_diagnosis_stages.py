@@ -1517,6 +1517,21 @@ def test_what_the_records_show_is_cited_as_seen(monkeypatch):
         assert "Its signature: " in wording.sentence(found[1], {})
 
 
+@pytest.mark.parametrize(("fitted", "told"), [((), True), ((0.0, 1.0), False)])
+@pytest.mark.parametrize(("kind", "asks"), [("inconclusive", True), ("extend", False)])
+def test_the_recordings_of_the_model_are_asked_for_before_new_ones(monkeypatch, fitted, told, kind, asks):
+    """Unless these are the recordings that it was identified from, or nothing is to be recorded."""
+    monkeypatch.setattr(advice, "_of_the_causes", lambda state: Evidence(kind))
+    monkeypatch.setattr(advice, "fastest_of", lambda *_: None)
+    model = SimpleNamespace(fit=SimpleNamespace(output=np.asarray(fitted)), polarity=1)
+    played = SimpleNamespace(output=np.asarray([0.0, 1.0, 2.0]), timed=True)
+    state = _state(_fit(1.0), verdict=kind)
+    asked = replace(state.question, given=Given(model), records=[played])
+    figures = advice.stage(replace(state, question=asked)).advice.figures
+    assert ("together" in figures) is (told and asks)
+    assert "together" not in advice.stage(state).advice.figures
+
+
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
 CLIPPED = Firing("clipped-input", "gate", 0.8, "{u}")
 DOUBTED = _finding("creep", 9.0, doubts=("own error",))
@@ -1621,7 +1636,7 @@ def test_a_line_at_a_frequency_of_the_mains_is_told_as_one(monkeypatch, frequenc
 
 
 # --- what goes into the model
-GIVEN = type("NamedModel", (str,), {"extensions": ()})("given")
+GIVEN = type("NamedModel", (str,), {"extensions": (), "fit": None})("given")
 
 
 def _asked_again(monkeypatch, shares):
@@ -2056,7 +2071,7 @@ def test_what_the_model_as_given_contains_is_not_news(monkeypatch, before, after
     monkeypatch.setattr(
         extension, "rms_of", lambda state, model, known: after if model == "extended" else before
     )
-    given = type("NamedModel", (str,), {"extensions": (Extension(contains, ()),)})("given")
+    given = type("NamedModel", (str,), {"extensions": (Extension(contains, ()),), "fit": None})("given")
     begun = SimpleNamespace(bins=SimpleNamespace(begins_free=False))
     state = _state(replace(_fit(500.0, "creep"), problem=begun), findings=(_finding("creep", 90.0),))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given(given)))

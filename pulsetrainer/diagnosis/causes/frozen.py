@@ -2,12 +2,14 @@
 
 Noise changes a value from sample to sample. So a value that is repeated exactly, more often than chance
 allows, was not measured anew, if meanwhile the input moves, and the output then jumps to where it has come.
+Where single values are repeated here and there, it is their number that chance does not allow.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.wild import runs_of
 from pulsetrainer.diagnosis.causes.base import OfTheRecord
 from pulsetrainer.diagnosis.evidence import sentences
@@ -21,6 +23,9 @@ _LEAST = 5  # equal values in a row: fewer may be rounding
 _MOVED = 0.01  # of the range: the input must go on by this much meanwhile
 _JUMP = 8.0  # times the noise: by so much the next value must differ
 _TIMES = 2  # a single stretch may be anything
+_SHARE = 0.02  # of all samples: so many repeats ...
+_BY_CHANCE = 4.0  # ... and so many times those of the noise
+_LOUD = 8.0  # converter steps: beside a repeat values must differ by more, or there is no noise there
 
 
 class Frozen(OfTheRecord):
@@ -58,7 +63,31 @@ class Frozen(OfTheRecord):
             jump = abs(float(y[last + 1] - y[last])) if last + 1 < y.size else 0.0
             if jump > _JUMP * noise and not breaks[last : last + 2].any():
                 jumps.append(jump)
+        again = _repeats(y, step, equal)
+        if again.any():
+            mask |= again
+            jumps += [float(np.max(np.abs(np.diff(y))[again[:-1]], initial=0.0))] * _TIMES
         if len(jumps) < _TIMES:
             return None
         figures = {"stretches": float(len(runs_of(mask))), "count": float(np.count_nonzero(mask))}
         return Firing(self.id, "gate", max(jumps), "{y}", figures, mask)
+
+
+def _repeats(y: FloatArray, step: float, equal: float) -> BoolArray:
+    """Samples (n,) that repeat the value before, if there are too many for the noise; none otherwise.
+
+    ``equal`` is the share of equal neighbours by chance, ``step`` that of the converter.
+    """
+    change = np.abs(np.diff(y))
+    again = np.append(False, change == 0.0)
+    beside = np.maximum(np.append(change, 0.0), np.append(0.0, change))  # before or after
+    around = np.maximum(np.append(beside[1:], 0.0), np.append(0.0, beside[:-1]))
+    often = np.mean(again) >= max(_SHARE, _BY_CHANCE * equal)
+    if not often or np.median(around[again]) <= _LOUD * step or _is_held(again):
+        return np.zeros(y.size, dtype=np.bool_)
+    return again & (y != y.min()) & (y != y.max())
+
+
+def _is_held(again: BoolArray) -> bool:
+    """Whether most values stand several times: a recorder that is slower than the table loses nothing."""
+    return int(np.argmax(np.bincount(np.diff(np.flatnonzero(~again), append=again.size)))) > 1

@@ -16,7 +16,8 @@ The first of these that applies is the advice:
 - Otherwise it is what the verdict asks for: a fault of the measurement is taken out of the record
   (`correct`), a property of the device goes into the model (`extend`).
 
-What the records lack comes after what can be done with them, or first if nothing can be done with them.
+What the records lack comes after what can be done with them, or first if nothing can be done with them. The
+records that the model was identified from may hold it: so these are to be diagnosed together first.
 The words are in ``advice_wording``.
 """
 
@@ -37,6 +38,7 @@ from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, faste
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.residual import HOLDS, LENGTH, RATES
 from pulsetrainer.diagnosis.stages.begin import TWO_SIZES
+from pulsetrainer.diagnosis.stages.given_model import is_its_own
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -58,6 +60,8 @@ _OF_WHAT_IS_LEFT = {
     "zero wanders": "keep steady",
     "held": "without the fault",
 }
+# Advice that the recordings of the model may make needless
+_ASKS_FOR_MORE = ("tied", "tied, no better", "lacks", "inconclusive", "again")
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 
@@ -66,6 +70,8 @@ def stage(state: State) -> State:
     advice = (
         _of_the_recorder(state) or _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
     )
+    if advice.kind in _ASKS_FOR_MORE and state.question.given is not None and not is_its_own(state):
+        advice = replace(advice, figures={**advice.figures, "together": 1.0})
     fastest = fastest_of(state, [one.cause.id for one in state.findings if one.found and one.in_doubt])
     if fastest is not None and "faster" not in advice.figures and state.question.timed:
         step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged

@@ -121,7 +121,7 @@ def _of_a_change(state: State, judged: Judged, changed: Change) -> tuple[State, 
         nothing = state.verdict == "none"
         said = Evidence("one stroke", figures={"given": PERCENT * given})
         return (replace(state, verdict="inconclusive") if nothing else state), [said]
-    if _is_its_own(state):  # nothing can have changed since
+    if is_its_own(state):  # nothing can have changed since
         nothing = state.verdict in ("none", "inconclusive")
         state = replace(state, verdict="unknown") if nothing else state
         return state, _not_carried(state, judged)
@@ -144,11 +144,11 @@ def _not_carried(state: State, judged: Judged) -> list[Evidence]:
         return []
     left = {"given": root_mean_square(judged.measured - judged.predicted), "refitted": refitted}
     percent = PERCENT / float(np.ptp(judged.measured))
-    kind = "given worse, own" if _is_its_own(state) else "given worse"
+    kind = "given worse, own" if is_its_own(state) else "given worse"
     return [Evidence(kind, figures={name: percent * size for name, size in left.items()})]
 
 
-def _is_its_own(state: State) -> bool:
+def is_its_own(state: State) -> bool:
     """Whether the model as given was identified from these very records."""
     assert state.question.given is not None
     model = state.question.given.model
