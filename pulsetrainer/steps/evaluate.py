@@ -251,9 +251,9 @@ def _begin(part: Run, dt_s: float | None, models: Sequence[Model]) -> tuple[int,
     if begin > by_input:
         return begin, left_out_words(begin - by_input)
     second = max(second_stroke(part.input, low, high) for low, high in ends)
-    if second > begin and all(_misses(part, second, dt_s, model) for model in models):
+    if second > begin and all(_misses(part, begin, second, dt_s, model) for model in models):
         return second, (
-            f"the first stroke ({second} samples) is left out: its error is more than "
+            f"the first stroke ({second - begin} samples) is left out: its error is more than "
             f"{LIMITS.first_stroke_missed:g} times that of all that follows, like that of a device "
             "that was never cycled before"
         )
@@ -273,11 +273,11 @@ def _known_from(part: Run, dt_s: float | None, model: Model) -> int:
     return max(known_from(part.input, low, high, one) for one in outputs)
 
 
-def _misses(part: Run, first: int, dt_s: float | None, model: Model) -> bool:
-    """Whether a model misses the first samples of a part far more than the others."""
+def _misses(part: Run, begin: int, second: int, dt_s: float | None, model: Model) -> bool:
+    """Whether a model misses the samples of a part between two far more than those that follow."""
     error = np.where(part.counts, part.output - predict(model, part.input, dt_s), 0.0)
-    after = metrics.root_mean_square(error[first:])
-    return metrics.root_mean_square(error[:first]) > LIMITS.first_stroke_missed * after
+    after = metrics.root_mean_square(error[second:])
+    return metrics.root_mean_square(error[begin:second]) > LIMITS.first_stroke_missed * after
 
 
 def _of_model(

@@ -65,6 +65,9 @@ def _until(run: Run, low: float, high: float) -> int:
 
 
 def _left(fitted: Fitted, where: Sequence[BoolArray]) -> float:
-    """Rms error of a fit over some samples (n,) of each record."""
-    pairs = zip(fitted.residuals, where, strict=True)
-    return root_mean_square(np.concatenate([residual[one] for residual, one in pairs]))
+    """Rms error of a fit over some samples (n,) of each record, where its memory is known."""
+    found = []
+    for record, residual, one in zip(fitted.records, fitted.residuals, where, strict=True):
+        known = np.arange(one.size) >= known_from(record.input, fitted.operator.low, fitted.operator.high)
+        found.append(residual[one & known])
+    return root_mean_square(np.concatenate(found))

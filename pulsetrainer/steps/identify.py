@@ -17,7 +17,7 @@ from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
-from pulsetrainer.core.initial_state import first_stroke_words, left_out_words
+from pulsetrainer.core.initial_state import first_stroke_words, known_from, left_out_words
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import ArgumentError, DataError
@@ -138,7 +138,9 @@ def identify(
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
     strokes = [first_stroke_words(run.input, run.output, operator.low, operator.high) for run in measured]
-    strokes = [left_out_words(n) if n else said for n, said in zip(left_out, strokes, strict=True)]
+    strokes = [
+        left_out_words(count) if count else said for count, said in zip(left_out, strokes, strict=True)
+    ]
     notes += [f"{title}: {words}" for title, words in zip(titles, strokes, strict=True) if words]
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
@@ -178,6 +180,8 @@ def _to_what_counts(
     if any(left_out):
         later = first_strokes.of_later(on, left_out)
         fitted, mended, masks = _without_wild(later, reach, runs, *rest)
+    known = [known_from(run.input, fitted.operator.low, fitted.operator.high) for run in mended]
+    left_out = [max(one - at, 0) for one, at in zip(left_out, known, strict=False)]
     return fitted, mended, masks, left_out or [0] * len(runs)
 
 
