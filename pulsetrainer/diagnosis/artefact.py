@@ -332,10 +332,10 @@ def extended_model(state: State, model: Model) -> Model:
         for t in state.repeated.terms
         if t in lasting or t in faults_of(state) or isinstance(t.cause, ConditionChange)
     ]
-    partial = not covers_range([one.input for one in state.problem.records], 0.0, 1.0)
+    partial = not covers_range([one.input[one.counts] for one in state.problem.records], 0.0, 1.0)
     behind = static_behind(state.repeated, known, model, scale, levels=levels_of(model) if partial else None)
     found = behind.identified.operator
-    remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
+    remembered = [(one.output if model.form == "dual" else one.input)[one.counts] for one in behind.records]
     covered = coverage(found.plane, remembered)
     if partial:
         found, covered = completed(found, covered, model, remembered)

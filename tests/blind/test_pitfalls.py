@@ -250,6 +250,19 @@ def test_one_of_two_records_that_is_turned_over_is_told():
     assert "different conditions" in found.next_experiment
 
 
+@pytest.mark.slow
+def test_what_only_clipped_samples_reach_stays_as_given():
+    """A lag of 60 ms, in a record that a sensor clips at 65 % of its output: the top of the model is kept."""
+    seen, clean = _runs_of_plays(lambda u, static, t, number: foreign.lagged(static, 0.06, t[1]))
+    rail = float(np.min(seen.output) + 0.65 * np.ptp(seen.output))
+    clipped = replace(seen, output=np.minimum(seen.output, rail))
+    model = pt.identify(clean)
+    found = pt.diagnose([clipped], model)
+    assert {one.cause for one in found.found} == {"output-lag", "saturation"}
+    plain, extended = (one.rms for one in pt.evaluate(clean, [model, pt.extend(model, found)]).models)
+    assert extended < plain  # twice as much with the top fitted to what is left there
+
+
 def _at_one_rate(shown, speed, seed=8):
     """A run at 100 Hz through drawn turns at one rate, without a rest; ``shown(u, dt_s)`` is the output."""
     rng = np.random.default_rng(seed)

@@ -2056,6 +2056,28 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
 
 
 @pytest.mark.parametrize(
+    ("after", "cause", "doubted"),
+    [(10.01, "unlisted", True), (9.9, "unlisted", False), (10.01, "creep", False)],
+)
+def test_a_curve_with_which_a_model_predicts_its_own_records_worse_is_in_doubt(
+    monkeypatch, after, cause, doubted
+):
+    """Nothing stands for it but what it predicts; a listed cause has its formula."""
+    _in_use(monkeypatch)
+    monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
+    monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
+    begun = SimpleNamespace(bins=SimpleNamespace(begins_free=False))
+    kind = Unlisted() if cause == "unlisted" else CAUSE[cause]
+    terms = (Term(kind, () if cause == "unlisted" else (0.1, 3.0)),)
+    state = _state(replace(_fit(500.0), terms=terms, problem=begun), verdict=cause)
+    given = replace(state.question, given=Given(GIVEN))
+    state = replace(state, repeated=state.current, question=given, findings=(Finding(kind, found=True),))
+    after = extension.stage(state)
+    assert after.findings[0].in_doubt is doubted
+    assert after.verdict == ("unknown" if doubted else cause)
+
+
+@pytest.mark.parametrize(
     ("before", "after", "contains", "said"),
     [
         (10.0, 10.0, "creep", "in the model"),

@@ -9,7 +9,8 @@ before the record, and will begin differently in the next one.
 If the model as given contains these causes already, and is no worse, that is said. A fault of the measurement
 that can be taken out of the records counts on neither side of the comparison. Equal loops show a cause by
 differences that the weights can absorb, not by what it predicts. If the model gains nothing with such a
-cause, it is tried without.
+cause, it is tried without. If it predicts worse with a learned dependence, that is in doubt: it was named
+for what it predicts.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from pulsetrainer.diagnosis.artefact import (
     with_its_offset,
 )
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.raw import noise_of
@@ -75,7 +77,18 @@ def _extended(state: State, given: Model) -> State:
     percent = percent_of_samples(state)
     figures = {"given": percent * against, "extended": percent * after, "rest": rest}
     said = Evidence(kind, figures=figures, names=names)
-    return replace(state, repeated=None, evidence=(*state.evidence, said))
+    state = replace(state, repeated=None, evidence=(*state.evidence, said))
+    return _curve_in_doubt(state) if kind == "no better" and names == (Unlisted.id,) else state
+
+
+def _curve_in_doubt(state: State) -> State:
+    """Return the state with its learned dependence in doubt: nothing stands for one but what it predicts."""
+    findings = tuple(
+        replace(one, doubts=(*one.doubts, DOUBT)) if one.found and one.cause.id == Unlisted.id else one
+        for one in state.findings
+    )
+    verdict = "unknown" if state.verdict == Unlisted.id else state.verdict
+    return replace(state, findings=findings, verdict=verdict)
 
 
 def _within_averages(state: State, fitted: Fitted) -> float:
