@@ -507,7 +507,7 @@ def _repeated(y, share, seed=11):
 
 
 @pytest.mark.parametrize("step", [0.0, 1e-5])
-@pytest.mark.parametrize(("share", "fires"), [(0.015, False), (0.1, True), (0.3, True), (0.6, True)])
+@pytest.mark.parametrize(("share", "fires"), [(0.015, False), (0.25, True), (0.4, True), (0.6, True)])
 def test_values_that_are_repeated_here_and_there_are_frozen(step, share, fires):
     """All repeats are masked but those at the ends of the output; a record as read has none."""
     y, again = _repeated(np.round(NOISY / step) * step if step else NOISY, share)
@@ -528,6 +528,14 @@ def test_a_slow_recorder_or_coarse_steps_are_not_frozen():
     quiet = np.where(SWINGS > 0.0, NOISY, np.round(SWINGS / 0.02) * 0.02)
     assert not _fires("frozen", quiet, SWINGS)
     assert not _fires("frozen", np.round(NOISY / 0.01) * 0.01, SWINGS)
+
+
+@pytest.mark.parametrize("step", [1e-4, 2e-4, 6e-4, 1.2e-3])
+def test_steps_of_a_converter_beside_something_smooth_are_not_frozen(step):
+    """What is added later, here and there, hides them: equal neighbours are equal by chance all the same."""
+    rng = np.random.default_rng(12)
+    bursts = 0.05 * rng.standard_normal(4000) * (np.sin(np.arange(4000) / 200.0) > 0.6)
+    assert not _fires("frozen", np.round(NOISY / step) * step + bursts, SWINGS)
 
 
 def test_what_may_repeat_a_value_is_not_frozen():

@@ -25,6 +25,8 @@ _JUMP = 8.0  # times the noise: by so much the next value must differ
 _TIMES = 2  # a single stretch may be anything
 _SHARE = 0.02  # of all samples: so many repeats ...
 _BY_CHANCE = 4.0  # ... and so many times those of the noise
+_CLOSE = 0.125  # ... and as many as change, but by no more than this times the noise ...
+_NEAR = 0.5  # ... and so many times those that change, but by no more than the noise
 _LOUD = 8.0  # converter steps: beside a repeat values must differ by more, or there is no noise there
 
 
@@ -63,7 +65,7 @@ class Frozen(OfTheRecord):
             jump = abs(float(y[last + 1] - y[last])) if last + 1 < y.size else 0.0
             if jump > _JUMP * noise and not breaks[last : last + 2].any():
                 jumps.append(jump)
-        again = _repeats(y, step, equal)
+        again = _repeats(y, noise, step, equal)
         if again.any():
             mask |= again
             jumps += [float(np.max(np.abs(np.diff(y))[again[:-1]], initial=0.0))] * _TIMES
@@ -73,16 +75,20 @@ class Frozen(OfTheRecord):
         return Firing(self.id, "gate", max(jumps), "{y}", figures, mask)
 
 
-def _repeats(y: FloatArray, step: float, equal: float) -> BoolArray:
+def _repeats(y: FloatArray, noise: float, step: float, equal: float) -> BoolArray:
     """Samples (n,) that repeat the value before, if there are too many for the noise; none otherwise.
 
-    ``equal`` is the share of equal neighbours by chance, ``step`` that of the converter.
+    ``equal`` is the share of equal neighbours by chance, if ``step`` is that of the converter. It may be
+    hidden by what was added later. But then as many values change by one step as are equal, or more.
     """
     change = np.abs(np.diff(y))
     again = np.append(False, change == 0.0)
     beside = np.maximum(np.append(change, 0.0), np.append(0.0, change))  # before or after
     around = np.maximum(np.append(beside[1:], 0.0), np.append(0.0, beside[:-1]))
     often = np.mean(again) >= max(_SHARE, _BY_CHANCE * equal)
+    moved = change[change > 0.0]
+    close, near = (np.count_nonzero(moved <= share * noise) for share in (_CLOSE, 1.0))
+    often &= np.count_nonzero(again) >= max(close, _NEAR * near)
     if not often or np.median(around[again]) <= _LOUD * step or _is_held(again):
         return np.zeros(y.size, dtype=np.bool_)
     return again & (y != y.min()) & (y != y.max())
