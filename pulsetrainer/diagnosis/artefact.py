@@ -320,7 +320,8 @@ def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
 def extended_model(state: State, model: Model) -> Model:
     """Return the model with the causes that repeat, its static part identified again from what they leave.
 
-    Where the records leave out a part of the model's range, its cells there stay as they were given.
+    Where what counts of the records leaves out a part of the model's range, its cells there stay as they
+    were given: what a sensor clips does not count.
     """
     lasting = state.extensions
     assert state.question.given is not None
@@ -335,10 +336,11 @@ def extended_model(state: State, model: Model) -> Model:
     partial = not covers_range([one.input[one.counts] for one in state.problem.records], 0.0, 1.0)
     behind = static_behind(state.repeated, known, model, scale, levels=levels_of(model) if partial else None)
     found = behind.identified.operator
-    remembered = [(one.output if model.form == "dual" else one.input)[one.counts] for one in behind.records]
-    covered = coverage(found.plane, remembered)
+    remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
+    counts = [one.counts for one in behind.records]
+    covered = coverage(found.plane, [x[one] for x, one in zip(remembered, counts, strict=True)])
     if partial:
-        found, covered = completed(found, covered, model, remembered)
+        found, covered = completed(found, covered, model, remembered, counts)
     return replace(
         model,
         edges=found.plane.edges,

@@ -85,13 +85,18 @@ def levels_of(model: Model) -> Plane:
 
 
 def completed(
-    found: Preisach, covered: BoolArray, model: Model, inputs: Sequence[FloatArray]
+    found: Preisach,
+    covered: BoolArray,
+    model: Model,
+    inputs: Sequence[FloatArray],
+    counts: Sequence[BoolArray],
 ) -> tuple[Preisach, BoolArray]:
     """Return a static part with the cells of a model where inputs (n,) never ``covered`` it (q,), and those.
 
-    Both lie on the levels of the model. Those cells stay as they are in the records, so they only shift the
-    output, which the offset undoes.
+    Both lie on the levels of the model. Where the inputs count (n,) those cells hardly change, so they only
+    shift the output, which the offset undoes.
     """
     both = replace(found, weights=np.where(covered, found.weights, model.weights))
-    shift = float(np.mean(np.concatenate([found(u) - both(u) for u in inputs])))
+    apart = [(found(u) - both(u))[one] for u, one in zip(inputs, counts, strict=True)]
+    shift = float(np.mean(np.concatenate(apart)))
     return replace(both, offset=both.offset + shift), covered | model.covered

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
@@ -17,18 +17,16 @@ from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
-from pulsetrainer.core.initial_state import first_stroke_words, known_from, left_out_words
 from pulsetrainer.core.loop import loop_of
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.plane import Plane, Reading
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.steps import first_strokes, fit_notes
+from pulsetrainer.steps import fit_notes, left_out
 from pulsetrainer.steps.arguments import EXCITATIONS, check_levels, named, several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
 TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
 SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
-_ROUNDS = 3  # of fits, each without the wild samples of the one before
 LEVELS = 48  # where nothing else is asked for
 FEWEST_LEVELS = 4
 _CROWDED = "the loop is steep: the levels lie closer where the output changes"
@@ -130,18 +128,15 @@ def identify(
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
     sure = [t.wild_input | m for t, m in zip(tamed, masked, strict=True)]
-    fitted, measured, masks, left_out = _to_what_counts(
+    rest = left_out.fit_to_the_rest(
         on, reach, measured, sure, [t.wild_output for t in tamed], [part.output for part in raw]
     )
+    fitted, measured, masks = rest.fitted, rest.runs, rest.wild
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
-    strokes = [first_stroke_words(run.input, run.output, operator.low, operator.high) for run in measured]
-    strokes = [
-        left_out_words(count) if count else said for count, said in zip(left_out, strokes, strict=True)
-    ]
-    notes += [f"{title}: {words}" for title, words in zip(titles, strokes, strict=True) if words]
+    notes += rest.first_strokes_in_words(titles)
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
     ensemble = _resampled(fitted, bootstrap, seed, notes)
@@ -171,71 +166,10 @@ def identify(
     return _model(fitted, measured, covered, ensemble, cleaned, said)
 
 
-def _to_what_counts(
-    on: Callable[..., Fitted], reach: tuple[float, float], runs: list[Run], *rest: Sequence[Any]
-) -> tuple[Fitted, list[Run], list[BoolArray], list[int]]:
-    """Fit without wild samples, and without first strokes (k samples) that keep it from what comes later."""
-    fitted, mended, masks = _without_wild(on, reach, runs, *rest)
-    left_out = first_strokes.apart(on, fitted, mended, rest[0]) if fit_notes.leaves_much(fitted) else []
-    if any(left_out):
-        later = first_strokes.of_later(on, left_out)
-        fitted, mended, masks = _without_wild(later, reach, runs, *rest)
-    known = [known_from(run.input, fitted.operator.low, fitted.operator.high) for run in mended]
-    left_out = [max(one - at, 0) for one, at in zip(left_out, known, strict=False)]
-    return fitted, mended, masks, left_out or [0] * len(runs)
-
-
-def _without_wild(
-    on: Callable[..., Fitted],
-    reach: tuple[float, float],
-    runs: list[Run],
-    sure: Sequence[BoolArray],
-    doubtful: Sequence[BoolArray],
-    raw: Sequence[FloatArray],
-) -> tuple[Fitted, list[Run], list[BoolArray]]:
-    """Fit without the samples that are known to be wild, then without those that its residual shows.
-
-    What only looks wild in the output beside its neighbours is ``doubtful``, such as a sharp turn: where the
-    fit predicts the ``raw`` output (n,) it counts again. Whether input or output is wild a residual does not
-    tell: what is off its own path is mended. The dual form remembers its output: there what the fit before
-    predicts takes the place of outputs that are wild, since between its neighbours a turn would lose its
-    extreme. The range of the levels and the form are decided anew, as wild samples move both.
-    """
-    masks = [one | other for one, other in zip(sure, doubtful, strict=True)]
-    fitted = on(_signals(runs), *reach, kept=[~m for m in masks] if any(map(np.any, masks)) else None)
-    span = float(np.ptp(np.concatenate([run.output for run in runs])))
-    masked = list(sure)  # those that are wild by themselves, or beside a fit
-    for number in range(_ROUNDS):
-        off = wild.off(raw, fitted.predicted, span, masks)
-        off = [wild.by_chance(o, run.input, reach[1] - reach[0]) for o, run in zip(off, runs, strict=True)]
-        masked = [before | now for before, now in zip(masked, off, strict=True)]
-        remembered = number == 0 and fitted.form == "dual" and any(map(np.any, masks))
-        if not remembered and all(map(np.array_equal, masked, masks)):
-            break
-        masks = list(masked)
-        predicted = fitted.predicted if fitted.form == "dual" else [None] * len(runs)
-        runs = [
-            replace(
-                run,
-                input=wild.repaired_where_off(run.input, mask),
-                output=wild.repaired_where_off(y, mask, said),
-            )
-            for run, y, mask, said in zip(runs, raw, masks, predicted, strict=True)
-        ]
-        ranges = np.asarray([input_range(run) for run in runs])
-        reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))
-        fitted = on(_signals(runs), *reach, kept=[~mask for mask in masks])
-    return fitted, runs, masks
-
-
 def to_their_tips(runs: list[Run]) -> list[Run]:
     """Return runs with turns of the input at their tips between samples, where that fits better."""
-    tips = turns.at_their_tips(_signals(runs), [r.time_s for r in runs], [r.counts for r in runs])
+    tips = turns.at_their_tips(left_out.signals(runs), [r.time_s for r in runs], [r.counts for r in runs])
     return [replace(run, input=tip) for run, tip in zip(runs, tips, strict=True)]
-
-
-def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:
-    return [(run.input, run.output) for run in runs]
 
 
 def _levels(runs: Sequence[Run], notes: list[str]) -> int:
@@ -245,14 +179,6 @@ def _levels(runs: Sequence[Run], notes: list[str]) -> int:
     if supported < LEVELS:
         notes.append(f"the record is short: {samples} samples support {supported} levels, not {LEVELS}")
     return min(supported, LEVELS)
-
-
-def input_range(run: Run) -> tuple[float, float]:
-    """Range of the input of a run; what noise adds beyond the reference does not count."""
-    low, high = float(np.min(run.input)), float(np.max(run.input))
-    if run.reference is not None:
-        low, high = max(low, float(np.min(run.reference))), min(high, float(np.max(run.reference)))
-    return low, high
 
 
 def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
@@ -294,7 +220,7 @@ def _with_samples(titles: Sequence[str], runs: Sequence[Run]) -> tuple[list[str]
 
 def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
     """Range of the input over all runs, or DataError where it does not move."""
-    ranges = [input_range(run) for run in runs]
+    ranges = [left_out.input_range(run) for run in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     if not high > low:
         listed = ", ".join(dict.fromkeys(names))
@@ -350,7 +276,7 @@ def _switched(
     A dual operator remembers the outputs. Noise moves the turns of either.
     """
     plane, dual = fitted.identified.operator.plane, fitted.form == "dual"
-    remembered = [x for x, _ in (exchanged(_signals(runs)) if dual else _signals(runs))]
+    remembered = [x for x, _ in (exchanged(left_out.signals(runs)) if dual else left_out.signals(runs))]
     turned = [input_noise.clean(run.output) for run in runs] if dual else cleaned
     noise = max(one.dead_band for one in turned)
     return coverage(plane, remembered), 100.0 * minor_coverage(plane, remembered, noise)

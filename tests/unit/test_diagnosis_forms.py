@@ -215,15 +215,31 @@ def test_what_records_never_reach_stays_as_it_was_given(polarity):
     found = replace(given, weights=np.where(covered, 1.1 * given.weights, 0.0), offset=0.3)
     told = np.arange(covered.size) == 0
     model = Model(plane.edges, given.weights, given.offset, told, polarity=polarity)
-    both, known = completed(found, covered, model, [u])
+    all_count = np.ones(u.size, dtype=bool)
+    both, known = completed(found, covered, model, [u], [all_count])
     np.testing.assert_array_equal(known, covered | told)
     np.testing.assert_allclose(both(u), found(u), atol=1e-12)
     stroke = np.linspace(0.6, 1.0, 41)
     rises = [np.diff(one(np.append(0.0, stroke))[1:]) for one in (both, given)]
     assert np.all(polarity * rises[0] > 0.0)
     np.testing.assert_array_equal(both.weights[~covered], given.weights[~covered])
-    dual, _ = completed(found, covered, replace(model, form="dual"), [u])
+    dual, _ = completed(found, covered, replace(model, form="dual"), [u], [all_count])
     np.testing.assert_array_equal(dual(u), both(u))
+
+
+def test_the_offset_of_a_completed_model_is_that_of_the_samples_that_count():
+    """The memory goes through all of them: a sensor may clip what the input reaches at the top."""
+    plane, rng = Plane.uniform(0.0, 1.0, 10), np.random.default_rng(7)
+    given = Preisach(plane, rng.uniform(1.0, 2.0, plane.areas.size), 0.5)
+    u = np.interp(np.linspace(0.0, 6.0, 601), np.arange(7), [0.0, 0.6, 0.0, 0.5, 0.2, 1.0, 0.0])
+    counts = u <= 0.6
+    covered = coverage(plane, [u[counts]])
+    found = replace(given, weights=np.where(covered, 1.1 * given.weights, 0.0), offset=0.3)
+    model = Model(plane.edges, given.weights, given.offset, covered)
+    both, _ = completed(found, covered, model, [u], [counts])
+    assert not np.all(covered)
+    assert np.mean((both(u) - found(u))[counts]) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_array_equal(both.weights[~covered], given.weights[~covered])
 
 
 MAGNET_HZ, LAG_S = 1000.0, 0.008

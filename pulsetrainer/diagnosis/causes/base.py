@@ -108,7 +108,7 @@ class Frame:
         return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
 
     def is_within_stroke(self, time_s: float) -> bool:
-        """Whether the input moves, on average, no farther than in one stroke in such a time."""
+        """Whether the input moves, on average, by more than a level in such a time, but within one stroke."""
         ranges = float(self.path[-1]) / self.reach * time_s / (self.input.size * self.dt_s)
         return _WITHIN_STROKE[0] < ranges < _WITHIN_STROKE[1]
 

@@ -68,8 +68,8 @@ class Frozen(OfTheRecord):
         again = _repeats(y, noise, step, equal)
         if again.any():
             mask |= again
-            jumps += [float(np.max(np.abs(np.diff(y))[again[:-1]], initial=0.0))] * _TIMES
-        if len(jumps) < _TIMES:
+            jumps.append(float(np.max(np.abs(np.diff(y))[again[:-1]], initial=0.0)))
+        elif len(jumps) < _TIMES:
             return None
         figures = {"stretches": float(len(runs_of(mask))), "count": float(np.count_nonzero(mask))}
         return Firing(self.id, "gate", max(jumps), "{y}", figures, mask)

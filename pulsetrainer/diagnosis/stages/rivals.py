@@ -176,7 +176,7 @@ def _may_be_own_error(state: State, term: Term, fall: float) -> bool:
     several = residual.TIME not in state.lacks and not {residual.RATES, residual.HOLDS} <= set(state.lacks)
     if cause.by_contrast or several:
         return False
-    if term.cause.shapes_strokes(term.values, state.problem.frames):
+    if cause.shapes_strokes(term.values, state.problem.frames):
         return True
     if not state.is_whole(state.current):
         return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
