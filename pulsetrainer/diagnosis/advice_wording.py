@@ -25,7 +25,7 @@ together: Before that: if you have the recordings that the model was identified 
 keep: Use the model as it is: nothing that was found calls for another one.
 known: If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up),
     record the same again, and identify the model from that.
-also: Before that, take {removed} out of the recording (pulsetrainer correct), and diagnose what is left.
+also: First take {removed} out of the recording (pulsetrainer correct), and diagnose what is left.
 whichever: Be it {either}, it does not belong in a model of the device: take {removed} out of the recording
     (pulsetrainer correct), and go on with the corrected one: it is right either way, but for what the causes
     differ by.
@@ -283,14 +283,14 @@ def advice(one: Evidence, bench: Bench, command: str = "", removed: Sequence[str
 
 def _parts(one: Evidence, command: str, faults: int, names: int, *, faster_too: bool) -> Iterator[str]:
     """Yield the sentences of an advice, of so many names of which some are faults of the measurement."""
+    if command == "correct" and one.kind not in (*_TIED, *_SAYS_CORRECT):
+        yield BESIDE["also"]
     if one.kind in _TIED:
         yield from _of_ties(one, command, faults, names)
     elif not (faster_too and one.kind in _NOTHING_ELSE):
         yield ADVICE[one.kind]
         if "one rate" in one.figures:
             yield BESIDE["no rest"]
-    if command == "correct" and one.kind not in (*_TIED, *_SAYS_CORRECT):
-        yield BESIDE["also"]
     if "together" in one.figures:
         yield BESIDE["together"]
     if faster_too:

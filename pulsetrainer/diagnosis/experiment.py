@@ -63,7 +63,8 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     plane = state.problem.plane
     found = []
     # lags look least alike in the shortest of records, which would tell nothing else
-    factors = (*_FASTER, as_fast_as(fastest_of(state, names))) if Creep.id in names else _FASTER
+    apart = sampled_apart(state)
+    factors = (*_FASTER, as_fast_as(fastest_of(state, names), apart)) if Creep.id in names else _FASTER
     for (name, shares), faster in product(_experiments().items(), factors):
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.static(u)
@@ -89,9 +90,21 @@ def _takes_time(term: Term, frame: Frame) -> bool:
     return any(one.unit == "s" and value >= one.small for value, one in zip(term.values, bounds, strict=True))
 
 
-def as_fast_as(tau: float | None) -> float:
-    """Return how many times faster an experiment must be to show a time, s; 1 where there is none."""
-    return 1.0 if tau is None else max(1.0, HOLD_S / (LIMITS.fast_stop * tau))
+def as_fast_as(tau: float | None, apart: float) -> float:
+    """Return how many times faster an experiment must be to show a time, s; 1 where there is none.
+
+    The samples of the record are so far ``apart``, s. Its bench is not asked for ones that are much closer.
+    """
+    if tau is None:
+        return 1.0
+    at_most = LIMITS.sampled_faster * SAMPLED_S / apart
+    return max(1.0, min(HOLD_S / (LIMITS.fast_stop * tau), at_most))
+
+
+def sampled_apart(state: State) -> float:
+    """Return the time between two samples of the first record, s."""
+    frame = state.problem.frames[0]
+    return frame.dt_s / frame.averaged
 
 
 def sampled_s(name: str) -> float:

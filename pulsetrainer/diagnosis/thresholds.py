@@ -203,6 +203,7 @@ class Thresholds:
     fast_steps: float = 5.0  # time steps: what is no slower is as fast as the samples ...
     fast_low: float = 1.1  # ... as is what comes so near to the shortest time that is searched
     fast_share: float = 0.4  # of the part at once: a creep as late as a lag is first tried with so much
+    sampled_faster: float = 10.0  # times as often as the record: what its bench may be asked for
     fast_stop: float = 5.0  # such times: by then all but 0.7 % has followed a step
     own_error: float = 1.5  # times what is left: devices of other kinds reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of the difference of two fits, by noise as it is

@@ -14,7 +14,8 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 # What evidence says, by its kind: figures in braces, and {input} and {output} for what was measured
 TEXTS = sentences("""\
-background: no larger than the slow noise around it: reported, but not a verdict
+background: it, or what it could equally be, is no larger than what wanders slowly in these recordings, and
+    may be part of that: reported, but not a verdict
 static: Refitted to these recordings without any cause, the model leaves {left:.3f} % of the span (rms of
     short averages). Noise and the number of levels alone would leave {floor:.3f} %.
 tested: the probability that noise alone looks like it is at most {p:.4f}. It accounts for {explains:.1f} % of

@@ -125,9 +125,9 @@ def _left(found: Diagnosis, model: Model) -> dict[str, str]:
 def corrected(out: Path, measured: Run, made: Run) -> Said:
     """Say what was taken out of a run."""
     masked = int((~made.counts).sum())
-    payload = {"output": out, "corrected": made.corrected, "masked_samples": masked}
-    change = largest_change(measured, made)
     unchanged = is_unchanged(measured, made)
+    payload = {"output": out, "corrected": () if unchanged else made.corrected, "masked_samples": masked}
+    change = largest_change(measured, made)
     rows = {"taken out": "nothing" if unchanged else ", ".join(made.corrected)}
     if not unchanged and (change or not masked):
         rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit)

@@ -67,9 +67,11 @@ def test_where_nothing_tells_what_lies_between_steps_that_is_said(folder):
     cause = Cause("quantisation", True, None, 0.0, 0.0, (Parameter("size", 0.02, "N", 0.02, 0.02),))
     pt.save(stepped, folder / "stepped.h5")
     pt.save(_diagnosis(stepped, "quantisation", (cause,)), folder / "steps.h5")
-    done = pulsetrainer(folder, "correct", "stepped.h5", "--diagnosis", "steps.h5", "-o", "unchanged.h5")
+    words = ("correct", "stepped.h5", "--diagnosis", "steps.h5", "-o", "unchanged.h5")
+    done = pulsetrainer(folder, *words)
     assert done.code == 0, done
     assert "the output is left as it was" in done.err
+    assert pulsetrainer(folder, *words, "--overwrite", "--json").json["corrected"] == []
     np.testing.assert_array_equal(pt.load(folder / "unchanged.h5").output, stepped.output)
 
 

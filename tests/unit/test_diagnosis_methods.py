@@ -951,6 +951,15 @@ def test_what_is_as_fast_as_the_samples_asks_for_a_faster_recording(kind):
     assert "A time of" not in advice_wording.advice(one, advice_wording.Bench(Scale(), "A", ours=True))
 
 
+@pytest.mark.parametrize(
+    ("tau", "apart", "faster"),
+    [(None, 0.005, 1.0), (1.0, 0.005, 1.0), (0.05, 0.005, 12.0), (0.001, 0.005, 12.5), (0.001, 0.1, 1.0)],
+)
+def test_no_bench_is_asked_for_samples_more_than_ten_times_as_close(tau, apart, faster):
+    """A creep of 2 ms among samples 5 ms apart had asked for 7700 V/s of a bench that ran at 4 V/s."""
+    assert experiment.as_fast_as(tau, apart) == pytest.approx(faster)
+
+
 def _quick(name, *values, dt_s=0.01, length=3000):
     """A cause with its values, on a record with so many samples."""
     frame = Frame(dt_s, np.zeros(length), 1.0, 1.0)

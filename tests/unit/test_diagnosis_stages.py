@@ -1597,7 +1597,7 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
 def test_a_faster_recording_is_asked_for_only_where_a_fast_cause_is_in_doubt(monkeypatch, doubts):
     """A delay of two samples that nothing else explains is known well enough."""
     monkeypatch.setattr(advice, "fastest_of", lambda state, names: 0.02 if "delay" in names else None)
-    monkeypatch.setattr(advice, "as_fast_as", lambda tau: 8.0)
+    monkeypatch.setattr(advice, "as_fast_as", lambda tau, apart: 8.0)
     problem = SimpleNamespace(**{**vars(PROBLEM), "frames": [Frame(0.01, np.zeros(9), 1.0, 1.0, averaged=4)]})
     state = _state(_fit(1.0), findings=(_finding("delay", 90.0, doubts=doubts),), problem=problem)
     figures = advice.stage(replace(state, lacks=("length",))).advice.figures

@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of
+from pulsetrainer.diagnosis.experiment import as_fast_as, best_experiment, fastest_of, sampled_apart
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.residual import HOLDS, LENGTH, RATES
 from pulsetrainer.diagnosis.stages.begin import TWO_SIZES
@@ -74,8 +74,8 @@ def stage(state: State) -> State:
         advice = replace(advice, figures={**advice.figures, "together": 1.0})
     fastest = fastest_of(state, [one.cause.id for one in state.findings if one.found and one.in_doubt])
     if fastest is not None and "faster" not in advice.figures and state.question.timed:
-        step = state.problem.frames[0].dt_s / state.problem.frames[0].averaged
-        figures = {"tau": fastest, "apart": step, "faster": as_fast_as(fastest)}
+        apart = sampled_apart(state)
+        figures = {"tau": fastest, "apart": apart, "faster": as_fast_as(fastest, apart)}
         advice = replace(advice, figures={**advice.figures, **figures})
     return replace(state, advice=advice)
 
