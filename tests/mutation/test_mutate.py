@@ -75,6 +75,19 @@ def test_every_fault_is_a_program():
     assert limit.text == "LIMIT = 0.5  # 2"
 
 
+def test_the_faults_that_change_nothing_are_lines_of_the_code():
+    """A line that was rewritten since is to be looked at again."""
+    import mutate
+
+    known = {(one["file"], one["line"]) for one in mutate._equivalent()}
+    gone = [(file, line) for file, line in sorted(known) if line not in _lines(mutate.ROOT / file)]
+    assert gone == []
+
+
+def _lines(file: Path) -> list[str]:
+    return [line.strip() for line in file.read_text().splitlines()] if file.exists() else []
+
+
 def test_a_program_forked_off_a_warm_one_counts_for_the_test_that_started_it():
     """Its lines name the test that the warm program was made for as well."""
     import mutate
