@@ -8,7 +8,7 @@ from typing import Any
 from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_text
 from pulsetrainer.report.diagnosis_figures import ranked
-from pulsetrainer.report.diagnosis_text import IN_MODEL, beside, in_doubt, too_little, unnamed
+from pulsetrainer.report.diagnosis_text import IN_MODEL, beside, in_doubt, rivals, too_little, unnamed
 from pulsetrainer.report.html import page
 
 
@@ -47,7 +47,7 @@ def headline(found: Diagnosis) -> str:
     cause = next(one for one in found.causes if one.cause == found.verdict)
     sure, doubted = beside(found)
     words = "In doubt" if in_doubt(found) else "Found"
-    tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
+    tied = f" ({rivals(cause)})" if cause.confounded_with else ""
     rest = "" if found.left.whole else ". Something else is left"
     named = ", ".join(dict.fromkeys([cause.cause + tied, *sure]))  # each once
     named += f"; in doubt: {', '.join(doubted)}" if doubted else ""

@@ -11,6 +11,7 @@ from typing import Any
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
 from pulsetrainer.artefacts.units import with_seconds, with_unit
 from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.wording import joined
 from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
@@ -39,6 +40,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
     held = found.verdict in found.in_model
     how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found) + (IN_MODEL,) * held
+    how += tuple(rivals(one) for one in found.found if one.cause == found.verdict and one.confounded_with)
     yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
     if seen := unnamed(found):
         yield Facts(f"seen, but not named: {seen}, which is {too_little(found)}", {})
@@ -164,10 +166,15 @@ def parameter(one: Parameter) -> str:
     return said + interval + (f": {one.meaning}" if one.meaning else "")
 
 
+def rivals(one: Cause) -> str:
+    """Return what a cause cannot be told from."""
+    return f"could equally be {joined(one.confounded_with, 'or')}"
+
+
 def _said(one: Cause) -> dict[str, str]:
     return {
         **parameters(one.parameters),
-        **({"or": f"could equally be {' or '.join(one.confounded_with)}"} if one.confounded_with else {}),
+        **({"or": rivals(one)} if one.confounded_with else {}),
         **({"why in doubt": "; ".join(one.doubts)} if one.doubts else {}),
     }
 

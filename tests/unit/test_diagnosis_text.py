@@ -234,6 +234,15 @@ def test_what_is_in_doubt_beside_the_verdict_is_not_called_found(doubts):
     assert course(found).axes[0].get_title("left") == f"Verdict: step{between}creep"
 
 
+def test_the_verdict_names_what_it_could_equally_be():
+    """A delay stood alone in the first line, of which the fourth said that it could be four other causes."""
+    one = replace(_cause(0.0, found=True), confounded_with=("delay", "viscous", "field-lag"))
+    found = replace(store_examples.diagnosis(), causes=(one,), verdict="creep")
+    said = "could equally be delay, viscous or field-lag"
+    assert next(iter(sections(found))).title == f"verdict: creep ({said})"
+    assert headline(found).startswith(f"Found: creep ({said})")
+
+
 def test_what_the_model_contains_already_is_told_first():
     """A verdict of creep, of a model with creep, read like a fault of that model."""
     found = replace(store_examples.diagnosis(), causes=(_cause(0.0, found=True),), verdict="creep")
