@@ -156,3 +156,12 @@ def wander(residual: FloatArray, measured: FloatArray) -> float:
         columns = np.linalg.qr(np.stack((np.ones(left.size), level - level.mean()), axis=1))[0]
         found += float(np.sum((columns.T @ left) ** 2))
     return found
+
+
+def shortest(values: FloatArray, share: float) -> int:
+    """Length of the shortest stretch of values (n,) that holds a share of their sum, to a hundredth of n."""
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    for length in np.unique(np.linspace(1, values.size, LIMITS.stretches).astype(int)).tolist():
+        if np.max(total[length:] - total[:-length]) >= share * total[-1]:
+            return int(length)
+    return values.size

@@ -148,6 +148,9 @@ class Thresholds:
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more than this
     piece_told: float = 0.02  # weight of a piece left out: enough where the others do not determine a weight
     wander_pieces: int = 10  # of the time: if a gain and an offset for each ...
+    stretch_holds: float = 0.8  # of what a step takes away: if so much lies in one stretch, shorter ...
+    stretch_of_side: float = 0.6  # ... than this share of its shorter side, it is an event (steps: 1.25 up)
+    stretches: int = 100  # lengths of a stretch that are tried
     wander_left: float = 0.33  # ... take away this share of what is left (true drifts: up to 0.15) ...
     wander_fall: float = 0.1  # ... and this share of what a drift took away, the record wanders
     wander_knots: int = 16  # of a zero that follows the time: it turns every twelfth of a record at most

@@ -2526,6 +2526,7 @@ def test_at_one_rate_all_that_widen_the_loop_are_one_family(lacks, others):
 def test_a_slow_fault_that_predicts_less_than_half_is_doubted(monkeypatch, name, gain, said):
     """A step takes a part of what a device of another kind leaves; a cause of the device must repeat."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(rivals, "_in_one_stretch", lambda state, term: False)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
     state = _state(_fit(1.0, name), held_out=HeldOut(gain), estimates={name: ()}, without={name: _fit(2.0)})
     object.__setattr__(state.current, "residual", np.zeros(3))
@@ -2537,6 +2538,7 @@ def test_a_slow_fault_that_predicts_less_than_half_is_doubted(monkeypatch, name,
 def test_a_step_that_only_whole_pieces_tell_is_doubted_by_whole_pieces(monkeypatch, of_all, said):
     """It had 95 % of them, and was in doubt since halves, which tell nothing of it, had 36 % of all."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(rivals, "_in_one_stretch", lambda state, term: False)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
     held_out = HeldOut(0.36)
     state = _state(_fit(1.0, "step"), held_out=held_out, estimates={"step": ()}, without={"step": _fit(2.0)})
@@ -2550,6 +2552,7 @@ def test_a_step_that_only_whole_pieces_tell_is_doubted_by_whole_pieces(monkeypat
 def test_what_settles_speaks_against_a_step_and_wear_against_heat(monkeypatch, sudden, said):
     """A step that only settles is in doubt; heat keeps its name."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(rivals, "_in_one_stretch", lambda state, term: False)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: True)
     state = _state(
         _fit(1.0, sudden), held_out=HeldOut(0.9), estimates={sudden: ()}, without={sudden: _fit(2.0)}
@@ -2611,6 +2614,7 @@ def test_steps_that_noise_averages_out_take_no_verdict(left, step, averages_out)
 @pytest.mark.parametrize("name", ["step", "creep"])
 def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, times, said, name):
     """More than a third of what is left, and a tenth of what the cause took away: by tenths of the time."""
+    monkeypatch.setattr(rivals, "_in_one_stretch", lambda state, term: False)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
     number = np.arange(4000)
     level = np.sin(0.37 * number)
@@ -2625,6 +2629,32 @@ def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, 
     state = replace(state, problem=problem, estimates={name: ()}, without={name: _fit(2.0)})
     doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, times * share / 0.3))
     assert ("wanders" in doubts) is (said and name == "step")
+
+
+@pytest.mark.parametrize(
+    ("begin", "length", "doubted"), [(1000, 3000, False), (3600, 400, False), (1000, 100, True)]
+)
+def test_a_step_that_is_over_soon_is_an_event(monkeypatch, begin, length, doubted):
+    """A device that went on relaxing for 3 s was given a step of 2 N for the 58 s after it."""
+    after = np.arange(4000) >= begin
+    monkeypatch.setattr(rivals, "_added", lambda state, term: after.astype(float))
+    left = np.random.default_rng(5).standard_normal(4000)
+    moved = (np.arange(4000) >= begin) & (np.arange(4000) < begin + length)
+    state = _state(Fit(1.0, (_term("step"),)))
+    without = _fit(2.0)
+    object.__setattr__(state.current, "residual", left)
+    object.__setattr__(without, "residual", left + 20.0 * moved)
+    state = replace(state, without={"step": without}, floor=SimpleNamespace(count=4000))
+    assert rivals._in_one_stretch(state, state.current.terms[0]) is doubted
+
+
+def test_the_shortest_stretch_that_holds_a_share():
+    """To a hundredth of all; the whole where no stretch holds so much."""
+    values = np.zeros(1000)
+    values[300:400] = 1.0
+    assert residual.shortest(values, 0.8) in range(80, 100)
+    assert residual.shortest(np.ones(1000), 0.8) in range(800, 820)
+    assert residual.shortest(np.ones(3), 1.1) == 3
 
 
 def test_what_the_model_says_of_its_record_is_told_once():

@@ -17,6 +17,8 @@ What speaks against a cause that was found is written beside it:
 - it is slow, and the residual still wanders from one tenth of the time to the next;
 - it is a slow fault of the measurement, and all causes together take away less than half of what can be
   lowered on blocks that were left out: in a device of another kind they would do as much;
+- it is sudden, and nearly all that it takes away lies in one stretch, much shorter than the time before and
+  after it: a step changes all that comes after;
 - it follows the speed, like anything that a device does as it moves; more than the noise from sample to
   sample is left, and of what the model leaves without it less than three quarters is predicted on blocks left
   out;
@@ -54,7 +56,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, LEAVES_MORE = "own error", "strength at bound", "leaves more"
 MAY_BE_NOTHING, SETTLES, IN_STEP = "spans zero", "settles", "in step"
-IMITATES = "imitates"
+IMITATES, ONE_STRETCH = "imitates", "one stretch"
 
 
 def stage(state: State) -> State:
@@ -139,8 +141,18 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     of_all = gain_of(state.baseline, state.current, state.floor)
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
+    if term.cause.sudden and _in_one_stretch(state, term):
+        yield ONE_STRETCH
     if wear.is_as_good(state, term):
         yield SETTLES if term.cause.sudden else MAY_BE_WEAR
+
+
+def _in_one_stretch(state: State, term: Term) -> bool:
+    """Whether what a sudden cause takes away lies in a stretch much shorter than both sides of its moment."""
+    after = int(np.count_nonzero(_added(state, term)))
+    side = min(after, state.floor.count - after)
+    falls = state.without[term.cause.id].residual ** 2 - state.current.residual**2
+    return residual.shortest(falls, LIMITS.stretch_holds) < LIMITS.stretch_of_side * side
 
 
 def squares_added(state: State, term: Term) -> float:
