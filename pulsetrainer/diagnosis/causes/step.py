@@ -9,6 +9,7 @@ import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.evidence import sentences
 
 _TRIED = 0.003  # of the span, and of the gain
 _MOMENTS = (0.05, 0.95, 25)  # of the record: from, to, how many; nearer to an end no loops can be compared
@@ -53,6 +54,14 @@ class Step(Cause):
     moves_zero = True
     lasting = False
     corrects = True
+    texts = sentences("""
+        against given: relative to the model as given, the {output} moves by {moved:+.2g}{in_y} at one moment;
+            apart from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings
+            hide some of the step
+        against given, nothing left: relative to the model as given, the {output} moves by {moved:+.2g}{in_y}
+            at one moment; apart from that, the model leaves no more than noise. Weights refitted to these
+            recordings hide some of the step
+    """)
 
     def __init__(self, shared: float = _SHARED) -> None:
         self._shared = shared

@@ -14,8 +14,8 @@ records.
   `unknown`; otherwise the verdict is `none`, or `inconclusive` if the records lack what would show a common
   cause (rates, rests or length). What only the coarser levels hide does not count.
 - The model as given may be *far off* (1 % of the span) where refitted weights are not (they leave a fifth of
-  that). If a drift of the zero then brings it near, that drift is the finding: refitted weights hide a drift
-  that is over soon.
+  that). If a drift of the zero, or a step, then brings it near, that is the finding: refitted weights hide a
+  drift that is over soon. The same holds where nothing was found, and it leaves much more than they do.
 - If the model is far off on records in which the input never turned, they cannot show a change, since a first
   stroke differs from all later ones: `none` becomes `inconclusive`.
 - If it is far off although it was identified from these very records, nothing can have changed since. Without
@@ -88,8 +88,9 @@ def stage(state: State) -> State:
     changed = _changed(state, judged)
     if changed is not None:
         state, more = _of_a_change(state, judged, changed)
-        said += more
-    said += _not_carried(state, judged) if changed is None else []
+    else:
+        state, more = _carried(state, judged)
+    said += more
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
         said += _each_against(judged)
     return replace(state, evidence=(*said, *state.evidence))
@@ -127,13 +128,23 @@ def _of_a_change(state: State, judged: Judged, changed: Change) -> tuple[State, 
         return state, _not_carried(state, judged)
     if _brought_near(state, judged):
         return state, []
-    return _drifted(state, judged, changed) or _far_off(state, judged, changed)
+    return _drifted(state, judged, changed.left) or _far_off(state, judged, changed)
 
 
 def _is_one_stroke(u: FloatArray) -> bool:
     """Whether an input (n,) never turns."""
     way = np.sign(np.diff(settled(u, LIMITS.no_turn * float(np.ptp(u)))))
     return bool(np.ptp(way[way != 0.0]) == 0.0) if way.any() else True
+
+
+def _carried(state: State, judged: Judged) -> tuple[State, list[Evidence]]:
+    """Say what is known of the model as given where no other condition shows."""
+    said = _not_carried(state, judged)
+    if not said or is_its_own(state):
+        return state, said
+    gain, offset = condition_change.carried(judged.measured, judged.predicted)
+    left = root_mean_square(judged.measured - gain * judged.predicted - offset)
+    return _drifted(state, judged, left) or (state, said)
 
 
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
@@ -184,9 +195,9 @@ def _brought_near(state: State, judged: Judged) -> bool:
     return judged.is_near(said)
 
 
-def _drifted(state: State, judged: Judged, changed: Change) -> tuple[State, list[Evidence]] | None:
-    """Return the state with the drift of the zero that the model as given shows; None if it shows none."""
-    told = given_drift.told(state, judged, changed)
+def _drifted(state: State, judged: Judged, otherwise: float) -> tuple[State, list[Evidence]] | None:
+    """Return the state with the drift or step that the model as given shows; None if it shows none."""
+    told = given_drift.told(state, judged, otherwise)
     if told is None:
         return None
     finding, fitted = told
