@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.judged import Judged, added
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT, TINY
 
 _Average = Callable[[Sequence[FloatArray]], FloatArray]
 
@@ -197,5 +197,5 @@ def _with_errors(known: FloatArray, left: FloatArray) -> tuple[FloatArray, Float
 
 
 def _solved(known: FloatArray, left: FloatArray) -> FloatArray:
-    size = np.linalg.norm(known, axis=0)
+    size = np.maximum(np.linalg.norm(known, axis=0), TINY)  # of a step, a tenth may hold all that comes after
     return np.asarray(np.linalg.lstsq(known / size, left, rcond=None)[0] / size)

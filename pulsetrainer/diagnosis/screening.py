@@ -64,7 +64,7 @@ class Sight:
         """
         sure = LIMITS.nine_of_ten * self.noise
         tested = self.critical * self.noise + sure
-        relevantly = sure + float(np.sqrt(sure**2 + relevant))
+        relevantly = LIMITS.share_unsure * (sure + float(np.sqrt(sure**2 + relevant)))
         return (max(tested, relevantly) + float(np.sqrt(max(there, 0.0)))) / self.share
 
 

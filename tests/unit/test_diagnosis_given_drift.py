@@ -136,7 +136,7 @@ def test_a_drift_that_takes_less_than_half_of_the_squares_is_not_told(monkeypatc
 
 
 @given(
-    st.floats(-1.0, 1.0), st.floats(0.1, 2.0), st.floats(0.05, 0.95), st.booleans(), st.integers(0, 2**32 - 1)
+    st.floats(-1.0, 1.0), st.floats(0.1, 2.0), st.floats(0.12, 0.88), st.booleans(), st.integers(0, 2**32 - 1)
 )
 def test_a_step_is_told_with_a_shift_beside_it(shift, size, moment, has_gain, seed):
     """Its moment and its size within their intervals, widened by half; the gain where there is one."""
@@ -194,6 +194,16 @@ def _strained(noise: np.random.Generator) -> tuple[pt.Run, float]:
     span = float(np.ptp(y))
     y = y + 0.003 * span * noise.standard_normal(n)
     return pt.Run(time_s=np.arange(n) * 0.01, input=u, output=y, input_unit="kV/mm", output_unit="mm/m"), span
+
+
+def test_a_step_that_one_tenth_of_the_time_holds_may_be_nothing():
+    """Without that tenth nothing is known of it."""
+    left = (np.arange(N) >= 0.95 * N) + 0.01 * np.random.default_rng(1).standard_normal(N)
+    bins = SimpleNamespace(average=_average)
+    problem = SimpleNamespace(bins=bins, frames=[FRAME], time_s=_average([np.arange(N) * STEP_S]))
+    found = given_drift.step_in(_average([left]), [np.zeros(N)], problem)
+    assert abs(found.values[0] - 1.0) < 0.01
+    assert 2.26 * found.errors[0] > found.values[0]
 
 
 def test_a_step_that_weights_of_either_sign_absorb_is_told_by_the_model_as_given():
