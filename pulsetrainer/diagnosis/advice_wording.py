@@ -62,22 +62,25 @@ tied, no better: We know of no kind of recording that would tell {names} apart m
 lacks: To see what this recording cannot show, {again}
 unknown: No known cause fits. Record the same again and diagnose both together: that shows whether the device
     does the same again, so that a model of this kind cannot follow it, or something else acts on it.
+comes and goes: What is left comes and goes, or jumps. Record the same again and diagnose both together: that
+    shows whether the device does the same again, so that a model of this kind cannot follow it, or something
+    else acts on it. Until then use the model as it is.
 another kind: The device does the same again, so no other recording helps: a model of this kind does not
     follow it further. Use the model if what it leaves does not matter to you, or a model of another kind.
 something acts: Something that is not in these recordings acts on the device or the sensor. Vary one thing at
     a time, such as temperature, load or supply, and record the same again each time. Then keep what matters
     as it is, and identify the model from a recording in which it was.
 without the fault: A fault of the measurement may be hidden in these recordings. Put it right (a sensor that
-    drifts must warm up), record the same again and identify a model from that. If it leaves less, the fault
-    was there: diagnose these recordings with that model to see how large it was.
+    drifts must warm up), record the same again, and diagnose both together. If that does not show it,
+    identify a model from the new recording, and diagnose these with that model.
 none: Nothing was found in this recording beyond what is taken for noise: use the model as it is.
 none, quick: The quick screen found nothing. The full diagnosis shows smaller effects.
 none, seen: Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger
     than the noise. Use the model as it is.
 none, correct: Nothing in this recording calls for another model: {names} can be seen, but no larger than the
     noise. Use the model as it is. To take that out too, go on with pulsetrainer correct.
-in the model: The model as given contains {names} already, and fitted again to these recordings it would be no
-    better: use it as it is.
+in the model: The model as given contains {names} already, and fitted again to these recordings it would be
+    hardly better: use it as it is.
 none, small: Nothing that matters was found in this recording: noise alone is unlikely to look like {names},
     but it is too small to matter, or does not predict what was left out of the fit. Use the model as it is.
 none, small, quick: Nothing that matters was found in this recording: noise alone is unlikely to look like

@@ -33,8 +33,7 @@ bursts: What is left comes and goes, or jumps, which noise does not do: it leave
     short averages, {times:.1f} times what the noise from sample to sample would leave. Something that was not
     recorded acts on the device or the sensor, or the model cannot follow a device of this kind
 zero wanders: What is left follows time alone as well as it follows any state of the device: the zero of the
-    {output} wanders, or the device changes slowly. Let device and sensor warm up, look for draughts and loose
-    plugs, and record again
+    {output} wanders, or the device changes slowly
 comes again: In two of these recordings the {input} is the same, and {share:.0f} % of what is left is the same
     too (squared, beyond noise). So it comes from the device, or from what is done to it each time, and no
     model of this kind follows it
@@ -46,8 +45,8 @@ not accepted: Noise alone is unlikely to look like {names} (p = {p:.3f}). But wh
     out. So it is not named.
 held: it would account for {share:.1f} % of the squared error beyond noise, but the weights of a model fitted
     to these recordings can absorb nearly all of such a fault. So these recordings show neither how large it
-    is nor whether it is there, and it is not named. To find out, identify a model from another recording, and
-    diagnose these with it
+    is nor whether it is there, and it is not named. To find out, diagnose another recording together with
+    these
 not repeated: A learned dependence fits what is left, but it did not repeat when whole stretches of time were
     left out, so it is not taken for a property of the device
 largest: The remaining error is largest {place}: {times:.1f} times the error where it is smallest.

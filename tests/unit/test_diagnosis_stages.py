@@ -1567,6 +1567,8 @@ DOUBTED = _finding("creep", 9.0, doubts=("own error",))
         ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),
         ({"findings": (TIED,), "verdict": "unknown", "evidence": (Evidence("zero wanders"),)}, "keep steady"),
         ({"findings": (TIED,), "verdict": "step", "evidence": (Evidence("zero wanders"),)}, "tied"),
+        ({"findings": (TIED,), "verdict": "step", "evidence": (Evidence("bursts"),)}, "tied"),
+        ({"verdict": "inconclusive", "evidence": (Evidence("bursts"),)}, "comes and goes"),
         ({"findings": (replace(TIED, found=False),)}, "none"),
         ({"findings": (TIED,), "evidence": (Evidence("wrong kind"),)}, "other model"),
         ({"findings": (TIED,), "evidence": (Evidence("changed", "condition-change"),)}, "identify anew"),
@@ -2083,11 +2085,13 @@ def test_a_curve_with_which_a_model_predicts_its_own_records_worse_is_in_doubt(
         (10.0, 10.0, "creep", "in the model"),
         (10.0, 10.1, "creep", "in the model"),
         (10.0, 10.0, "delay", "no gain"),
-        (10.0, 9.82, "creep", "no gain"),
+        (10.0, 9.82, "creep", "in the model"),
+        (10.0, 7.08, "creep", "in the model"),
+        (10.0, 7.06, "creep", None),
     ],
 )
 def test_what_the_model_as_given_contains_is_not_news(monkeypatch, before, after, contains, said):
-    """A model that was extended by creep was diagnosed as one without."""
+    """A model that was extended by creep was diagnosed as one without; one that gains much is extended."""
     _in_use(monkeypatch)
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(
@@ -2098,7 +2102,8 @@ def test_what_the_model_as_given_contains_is_not_news(monkeypatch, before, after
     state = _state(replace(_fit(500.0, "creep"), problem=begun), findings=(_finding("creep", 90.0),))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given(given)))
     found = extension.stage(replace(state, verdict="creep"))
-    assert [one.kind for one in found.evidence] == [said]
+    assert [one.kind for one in found.evidence] == ([said] if said else [])
+    assert (found.extended is not None) is (said is None)
     assert found.in_model == (("creep",) if said == "in the model" else ())
     assert (advice.stage(found).advice.kind == "in the model") is (said == "in the model")
 

@@ -9,6 +9,7 @@ The first of these that applies is the advice:
   needed. If it differs between them, or follows time alone (also as a drift of another course), device and
   sensor must be kept steady. If the weights may hide a fault of the measurement, a record without it is
   needed.
+- If nothing was found, but what is left comes and goes, the same is to be recorded again.
 - If the model contains already what was found, it is used as it is.
 - If causes are tied, the advice is the experiment on which they look least alike, simulated with the model
   that was found.
@@ -60,6 +61,8 @@ _OF_WHAT_IS_LEFT = {
     "zero wanders": "keep steady",
     "held": "without the fault",
 }
+# ... and where nothing was found
+_THOUGH_NOTHING = {"bursts": "comes and goes"}
 # Advice that the recordings of the model may make needless
 _ASKS_FOR_MORE = ("tied", "tied, no better", "lacks", "inconclusive", "again")
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
@@ -93,8 +96,10 @@ def _of_the_conditions(state: State) -> Evidence | None:
     began = [one for one in state.evidence if one.kind == "under way"]
     if began and state.extended is None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
-    seen = [one.kind for one in state.evidence] if state.verdict == "unknown" else []
-    told = [_OF_WHAT_IS_LEFT[kind] for kind in _OF_WHAT_IS_LEFT if kind in seen]
+    seen = [one.kind for one in state.evidence]
+    nothing = _THOUGH_NOTHING if state.verdict in ("none", "inconclusive") else {}
+    asked = _OF_WHAT_IS_LEFT if state.verdict == "unknown" else nothing
+    told = [asked[kind] for kind in asked if kind in seen]
     if state.verdict == "unknown" and any(TWO_SIZES in one.doubts for one in state.findings):
         told.append("keep steady")
     return Evidence(told[0]) if told else None

@@ -6,11 +6,11 @@ the model as given, and better than a static model that was fitted to them, by a
 the causes gain in the search; otherwise nothing is added. A cause that gains less was already under way
 before the record, and will begin differently in the next one.
 
-If the model as given contains these causes already, and is no worse, that is said. A fault of the measurement
-that can be taken out of the records counts on neither side of the comparison. Equal loops show a cause by
-differences that the weights can absorb, not by what it predicts. If the model gains nothing with such a
-cause, it is tried without. If it predicts worse with a learned dependence, that is in doubt: it was named
-for what it predicts.
+If the model as given contains these causes already, the new one must leave less than half of its squared
+error; otherwise that is said. A fault of the measurement that can be taken out of the records counts on
+neither side of the comparison. Equal loops show a cause by differences that the weights can absorb, not by
+what it predicts. If the model gains nothing with such a cause, it is tried without. If it predicts worse with
+a learned dependence, that is in doubt: it was named for what it predicts.
 """
 
 from __future__ import annotations
@@ -65,12 +65,13 @@ def _extended(state: State, given: Model) -> State:
     if ConditionChange.id not in state.repeated.names:
         static = plain.squares / state.floor.count + _within_averages(state, state.repeated)
         beaten = min(beaten, static * state.scale.span**2)
-    if beaten - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
-        return replace(state, extended=extended)
     names = tuple(term.cause.id for term in state.extensions)
+    held = set(names) <= {one.cause for one in given.extensions}  # what they gain, the model has already
+    needed = LIMITS.half * before**2 if held else LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2
+    if beaten - after**2 > needed:
+        return replace(state, extended=extended)
     rest = _rest(state)
-    relevant = state.floor.relevant / state.floor.count * state.scale.span**2
-    if before**2 - after**2 <= relevant and set(names) <= {one.cause for one in given.extensions}:
+    if held:
         kind, against = "in the model", before
     else:
         kind, against = _why_not(state, after**2 <= beaten, rest), float(np.sqrt(beaten))
