@@ -51,6 +51,9 @@ def diagnosis_of(state: State) -> Diagnosis:
     percent = PERCENT / float(np.ptp(problem.measured))
     of_samples = scale.span * percent_of_samples(state)
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
+    in_use = float("nan")
+    if state.extended is not None:
+        in_use = rms_of(state, state.extended, undone(state)) / scale.span
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     bench = advice_wording.Bench(
         scale,
@@ -71,8 +74,8 @@ def diagnosis_of(state: State) -> Diagnosis:
         quick=state.question.quick,
         rms=rms,
         rms_percent=rms * of_samples / scale.span,
-        # slow noise, told of averages, may come out larger; no more than all that is left is noise
-        noise_percent=min(_noise_of(state), rms / scale.span) * of_samples,
+        # slow noise, or a hum, may come out larger; no more than all that is left is noise
+        noise_percent=float(np.nanmin((_noise_of(state), rms / scale.span, in_use))) * of_samples,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor_rms * percent,
@@ -88,9 +91,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
         after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
         extended=state.extended,
-        extended_rms_percent=float("nan")
-        if state.extended is None
-        else rms_of(state, state.extended, undone(state)) * of_samples / scale.span,
+        extended_rms_percent=in_use * of_samples,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         input_quantity=model.input_quantity,
