@@ -24,6 +24,8 @@ tested, small: the probability that noise alone looks like it is at most {p:.4f}
     cannot be determined: the whole error is no more than noise and levels may leave. {signature}.
 extended: With these causes in the model, {left:.3f} % of the span remains (rms of short averages).
 would have shown: The smallest effects that these recordings would have shown, rms, % of the span: {limits}
+would have shown, some: The smallest effects that these recordings would have shown, rms, % of the span:
+    {limits}. Of {names} they would have shown no effect below a tenth of the span
 not whole: Not all of it is explained by {names}: {rest:.2g} % of the span comes from something else, which
     noise and levels do not account for
 slow noise: What is taken for noise here is slow: it leaves {white:.2g} % of the span in short averages,

@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.diagnosis import equal_inputs, residual
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Finding
@@ -49,7 +50,9 @@ def stage(state: State) -> State:
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
     shown = {k: PERCENT * v for k, v in state.detectable.items() if v < LIMITS.told_effect}
     if state.verdict in ("none", "inconclusive") and shown:
-        said.append(Evidence("would have shown", figures=shown))
+        usual = [one.id for one in library().values() if one.common or one.drifts]
+        held = tuple(one for one in usual if one not in shown)
+        said.append(Evidence("would have shown, some" if held else "would have shown", "", shown, names=held))
     if state.verdict in ("none", "inconclusive", "unknown") and not state.is_whole(state.current):
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:

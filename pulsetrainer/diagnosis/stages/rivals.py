@@ -17,8 +17,8 @@ What speaks against a cause that was found is written beside it:
 - it is slow, and the residual still wanders from one tenth of the time to the next;
 - it is a slow fault of the measurement, and all causes together take away less than half of what can be
   lowered on blocks that were left out: in a device of another kind they would do as much;
-- it is sudden, and nearly all that it takes away lies in one stretch, much shorter than the time before and
-  after it: a step changes all that comes after;
+- it is sudden, its size is uncertain, and nearly all that it takes away lies in one stretch, much shorter
+  than the time before and after it: a step changes all that comes after;
 - it follows the speed, like anything that a device does as it moves; more than the noise from sample to
   sample is left, and of what the model leaves without it less than three quarters is predicted on blocks left
   out;
@@ -141,10 +141,16 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     of_all = gain_of(state.baseline, state.current, state.floor)
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
-    if term.cause.sudden and _in_one_stretch(state, term):
+    sizes = term.cause.strengths_of(state.estimates[term.cause.id]) if term.cause.sudden else ()
+    if sizes and all(_is_rough(one) for one in sizes) and _in_one_stretch(state, term):
         yield ONE_STRETCH
     if wear.is_as_good(state, term):
         yield SETTLES if term.cause.sudden else MAY_BE_WEAR
+
+
+def _is_rough(size: Estimate) -> bool:
+    """Whether a strength is known to no better than half of it."""
+    return size.upper - size.lower > 2.0 * LIMITS.half * abs(size.value)
 
 
 def _in_one_stretch(state: State, term: Term) -> bool:
