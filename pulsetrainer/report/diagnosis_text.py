@@ -55,10 +55,10 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
             if stands(found, fields)
         ),
     )
-    others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
     columns = ("cause", "found", "explains, %", "held-out\nshare, %")
-    rows = tuple(_row(one, found) for one in (*found.found, *others))
-    explained = {one.cause: one.text for one in others if one.text}  # those found were told above
+    rows = tuple(_row(one, found) for one in tried(found))
+    # those found were told above
+    explained = {one.cause: one.text for one in tried(found) if one.text and not one.found}
     if tells_shares(found):
         yield Table("causes, strongest first", columns, rows)
         explained = COLUMNS | explained
@@ -68,6 +68,12 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         yield Facts("in this table", explained)
     yield Facts("evidence", {str(k): text for k, text in enumerate(evidence(found), start=1)})
     yield Facts("next", {" " * k: one for k, one in enumerate(found.advice)})
+
+
+def tried(found: Diagnosis) -> list[Cause]:
+    """Return the causes of the table, here and on the page: all that were found, then the strongest others."""
+    others = [one for one in found.causes if not one.found]
+    return [*found.found, *others[: max(_SHOWN - len(found.found), 0)]]
 
 
 def evidence(found: Diagnosis) -> list[str]:
