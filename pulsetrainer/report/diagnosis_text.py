@@ -71,7 +71,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
 
 
 def tried(found: Diagnosis) -> list[Cause]:
-    """Return the causes of the table, here and on the page: all that were found, then the strongest others."""
+    """Return the causes of the table, here and on the page: those found, then the strongest others."""
     others = [one for one in found.causes if not one.found]
     return [*found.found, *others[: max(_SHOWN - len(found.found), 0)]]
 
