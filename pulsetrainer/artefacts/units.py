@@ -300,6 +300,28 @@ def with_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s"
 
 
+_SLOW_Hz = 0.1  # a lower frequency is easier to read as a period
+_SLOW = 1e-3  # a smaller figure of a rate is easier to read in minutes and longer ...
+_READ = 0.01  # ... in which it is no smaller than this
+
+
+def more_easily(value: float, unit: str) -> str:
+    """Return a long time, a low frequency or a slow rate in other units, in which it is easily read.
+
+    ``2.5 h``, ``once in 24.1 h``, ``0.095 %/d``; empty where its own unit will do.
+    """
+    if unit == "s":
+        easy = with_seconds(value)
+        return easy if easy.endswith((" min", " h", " d")) else ""
+    if unit == "Hz" and 0.0 < value < _SLOW_Hz:
+        return f"once in {with_seconds(1.0 / value)}"
+    if unit.endswith("/s") and 0.0 < abs(value) < _SLOW:
+        times = ("min", "h", "d")
+        one = next((one for one in times if abs(value) * SECONDS[one] >= _READ), times[-1])
+        return with_unit(f"{value * SECONDS[one]:.2g}", unit.removesuffix("s") + one)
+    return ""
+
+
 def unit_of_axis(seconds: float) -> tuple[str, float]:
     """Return the unit in which an axis of a time so long is easily read, s or more, and its length in s."""
     return next((unit, one) for unit, one, least in _EASY if seconds >= least or unit == "s")

@@ -14,6 +14,7 @@ from pulsetrainer.artefacts.units import (
     check_unit,
     counted,
     is_unit,
+    more_easily,
     same_units,
     shown,
     split_unit,
@@ -293,6 +294,20 @@ def test_a_pure_number_is_no_factor_of_a_unit():
 def test_a_time_is_told_in_the_unit_that_fits(seconds, said):
     """From nanoseconds to days."""
     assert with_seconds(seconds) == said
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (2.59e6, "s", "30 d"), (599.0, "s", ""), (1.155e-5, "Hz", "once in 24.1 h"), (0.1, "Hz", ""),
+        (0.05, "Hz", "once in 20 s"), (0.0, "Hz", ""), (1.098e-6, "%/s", "0.095 %/d"),
+        (-5e-4, "N/s", "-0.03 N/min"), (5e-6, "mm/m/s", "0.018 mm/m/h"), (1e-3, "N/s", ""), (0.0, "N/s", ""),
+        (1e-9, "N/s", "8.6e-05 N/d"), (1e-6, "N", ""),
+    ],
+)  # fmt: skip
+def test_what_is_slow_is_told_in_longer_times(value, unit, said):
+    """A day is no 1.155e-05 Hz to anybody."""
+    assert more_easily(value, unit) == said
 
 
 @pytest.mark.parametrize(
