@@ -122,6 +122,7 @@ MESSAGES = {
     "no whole beat": Message("no whole beat", ""),
     "a unit like it": Message("{wrong}", "mean '{unit}'", "{argument}"),
     "no such unit": Message("is not a known unit", "{argument}", "{place}"),
+    "no such share": Message("is not a known unit", "pure number, % and ‰", "{place}"),
     "provenance itself": Message("provenance", ""),
     "no time zone": Message("time zone", "datetime.now"),
     "cannot be read": Message("cannot be read", "", "{file}"),

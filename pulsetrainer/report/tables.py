@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
-from pulsetrainer.artefacts.units import more_easily
 from pulsetrainer.report.names import NAMES, digits, split, told
 
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
@@ -113,9 +112,13 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
 
 def _told(name: str, value: Any) -> str:
     """Return a value as a person reads it: a long time, a low rate also in other units."""
+    said = text(told(name, value))
     unit = {"seconds": "s", "rate_Hz": "Hz"}.get(name)
-    easy = more_easily(value, unit) if unit else ""
-    return text(told(name, value)) + (f" = {easy}" if easy else "")
+    if unit is None:
+        return said
+    from pulsetrainer.artefacts.units import more_easily  # noqa: PLC0415  # with it comes numpy
+
+    return " = ".join(filter(None, (said, more_easily(value, unit))))
 
 
 def label(name: str) -> str:

@@ -231,6 +231,21 @@ def test_how_a_quantity_is_measured_is_no_part_of_its_unit(written, unit):
     assert symbol_of(written) == unit
 
 
+@pytest.mark.parametrize(
+    ("heading", "unit"),
+    [
+        ("Water content [vol%]", "vol%"), ("theta (Vol.-%)", "vol%"), ("Wassergehalt Vol%", "vol%"),
+        ("S [10^-3]", "‰"), ("S (1e-3)", "‰"), ("S / 10⁻³", "‰"), ("S [10**-6]", "ppm"),
+        ("strain_ustrain", "µε"), ("eps [microstrain]", "µε"), ("eps [µε]", "µε"),
+        ("eps [\N{GREEK SMALL LETTER MU}ε]", "µε"),
+    ],
+)  # fmt: skip
+def test_a_share_is_read_as_people_write_it(heading, unit):
+    """Also as an option; of 10^-3 the hint was to write 1, without the factor."""
+    written = split_unit(heading)[1]
+    assert check_unit(symbol_of(written), "input unit") == check_unit(written, "--input-unit") == unit
+
+
 @pytest.mark.parametrize(("wrong", "unit"), [("mbar foo", "mbar"), ("mBar", "mbar"), ("degrees", "deg")])
 def test_the_unit_that_is_offered_first_has_the_same_prefix(wrong, unit):
     """Another one is off by a factor of a thousand."""
@@ -264,6 +279,12 @@ def test_no_units(text):
     assert not is_unit(text)
     with raises(DataError, "no such unit", argument="input unit", place="the heading 'x' of a.csv"):
         check_unit(text, "input unit", "the heading 'x' of a.csv")
+
+
+def test_the_hint_for_an_unknown_share_keeps_its_factor():
+    """Only 1 was named for numbers without a unit."""
+    with raises(DataError, "no such share", place="the heading 'x' of a.csv"):
+        check_unit("thousandths", "input unit", "the heading 'x' of a.csv")
 
 
 @pytest.mark.parametrize(
