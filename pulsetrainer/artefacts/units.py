@@ -25,6 +25,7 @@ _PREFIXED_SYMBOLS = """
 _BARE_SYMBOLS = """
     1 % ‰ percent permille ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev
     U/min
+    vol% wt% mol% at% µε με
     atm counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
 """
 # what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
@@ -32,7 +33,7 @@ _BARE_SYMBOLS = """
 _SUFFIXES = """
     s ms us µs ns min h A mA uA nA pA kA V mV uV kV N mN uN nN cN kN Nm mNm T mT m cm mm um µm nm Pa kPa MPa
     GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm Wb mWb uWb Vs mVs ppm m3/m3
-    deg rad C °C degC K Hz kHz W g kg % percent permille Ah mAh Wh mWh kWh
+    deg rad C °C degC K Hz kHz W g kg % percent permille vol% Vol% wt% µε Ah mAh Wh mWh kWh
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
     l/h l/min l/s L/h L/min L/s ml/min m3/h m3/s U/min
 """
@@ -65,6 +66,18 @@ _SPELLED |= {
     for long, short in _SPELLED.items()
     if short in _PREFIXED
 }
+_SHARES = {
+    word: unit
+    for unit, words in {
+        "µε": "microstrain ustrain µstrain μstrain",
+        "vol%": "vol% vol-% vol.% vol.-%",
+        "%": "10^-2 10**-2 1e-2 10⁻²",
+        "‰": "10^-3 10**-3 1e-3 10⁻³",
+        "ppm": "10^-6 10**-6 1e-6 10⁻⁶",
+    }.items()
+    for word in words.split()
+}
+_SPELLED |= _SHARES
 _SPELLED |= dict.fromkeys("-–—\N{MINUS SIGN}", "1")  # "none"
 # how a quantity is measured, behind its unit: none changes the numbers of a record
 _MANNER = re.compile(r"(?:[\s(]+(?:abs|rel|gauge|rms|eff|pp|pk|peak|ac|dc)\.?|rms|pp)\)?$", re.IGNORECASE)
@@ -130,6 +143,7 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
     DataError where it is none; ``what`` is the option for it, ``where`` what it was read from, if anything
     ("the heading 'Force (measured)' of scope.csv"), ``remedy`` what may be done but giving the unit.
     """
+    text = _SHARES.get(text.strip().lower(), text)  # one that is spelled out is worth a hint
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
     known = [one for one in (symbol_of(text), *text.split()[:1]) if is_unit(one)]  # not bar for mbar
@@ -140,7 +154,8 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
         f"{text!r} in {where} is not a known unit" if where else f"{what} {text!r} is not a known unit",
         hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
         if near
-        else f"{remedy}give {what}, such as N or mm/s^2; 1 stands for a pure number",
+        else f"{remedy}give {what}, such as N or mm/s^2; 1 stands for a pure number, "
+        "% and ‰ for its hundredths and thousandths",
     )
 
 
@@ -298,6 +313,28 @@ def with_seconds(seconds: float) -> str:
             size = seconds / one
             return f"{size:.0f} {unit}" if abs(size) >= _WHOLE else f"{size:.3g} {unit}"
     return f"{seconds:.3g} s"
+
+
+_SLOW_Hz = 0.1  # a lower frequency is easier to read as a period
+_SLOW = 1e-3  # a smaller figure of a rate is easier to read in minutes and longer ...
+_READ = 0.01  # ... in which it is no smaller than this
+
+
+def more_easily(value: float, unit: str) -> str:
+    """Return a long time, a low frequency or a slow rate in other units, in which it is easily read.
+
+    ``2.5 h``, ``once in 24.1 h``, ``0.095 %/d``; empty where its own unit will do.
+    """
+    if unit == "s":
+        easy = with_seconds(value)
+        return easy if easy.endswith((" min", " h", " d")) else ""
+    if unit == "Hz" and 0.0 < value < _SLOW_Hz:
+        return f"once in {with_seconds(1.0 / value)}"
+    if unit.endswith("/s") and 0.0 < abs(value) < _SLOW:
+        times = ("min", "h", "d")
+        one = next((one for one in times if abs(value) * SECONDS[one] >= _READ), times[-1])
+        return with_unit(f"{value * SECONDS[one]:.2g}", unit.removesuffix("s") + one)
+    return ""
 
 
 def unit_of_axis(seconds: float) -> tuple[str, float]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
@@ -34,6 +35,8 @@ _IN_SECONDS = " in s"  # the heading that `diagnose` asks for: whole seconds und
 _SLOW_S, _MANY = 0.2, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
+_HOUR_S = 3600.0  # that a clock is set back by for winter time ...
+_SOME, _FEW = 0.5, 4.0  # ... where with an hour more a step is from so many to so many usual ones
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 
 
@@ -166,20 +169,37 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         this, before = (
             _as_written(table, name, k, f"{stamps[k]:.15g} {unit or 's'}") for k in (row, row - 1)
         )
-        if stamps[row] != stamps[row - 1]:
-            hint = "sort the rows"
-            other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
-        elif all(column[row] == column[row - 1] for column in table.columns.values()):
-            hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
-        else:
-            hint = "its time stamps are repeated, or rounded too coarsely: write them with more digits"
-            other = ", or give a `rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
             f"{this} after {before} ({counted(back.size, 'such row')})",
-            hint=hint + other * of_record,
+            hint=_remedy(table, time_s, back, dated=":" in this, of_record=of_record),
         )
     return time_s
+
+
+def _remedy(table: Table, time_s: FloatArray, back: NDArray[np.intp], *, dated: bool, of_record: bool) -> str:
+    """Say what to do about times that do not increase behind the samples ``back``; ``dated``: stamps."""
+    row = int(back[0]) + 1
+    instead = ", or give a `rate_Hz` instead of the time" * of_record
+    if all(column[row] == column[row - 1] for column in table.columns.values()):
+        return f"drop the repeated rows{instead}"
+    if dated and _is_winter_time(np.diff(time_s), back):
+        return (
+            "the clock may have been set back for winter time: add an hour to the rows from there on, or "
+            f"write the stamps with their offset from UTC (2024-10-27T02:00:00+01:00){instead}"
+        )
+    if time_s[row] != time_s[row - 1]:
+        other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
+        return "sort the rows" + other * of_record
+    return f"its time stamps are repeated, or rounded too coarsely: write them with more digits{instead}"
+
+
+def _is_winter_time(step: FloatArray, back: NDArray[np.intp]) -> bool:
+    """Whether each step back of steps (n,), s, is a usual one, or a few, after an hour more."""
+    usual = float(np.median(step))
+    late = step[back] + _HOUR_S
+    few = (late >= _SOME * usual) & (late <= _FEW * usual)
+    return bool(usual > 0.0 and np.all(few & ((step[back] < 0.0) | (usual >= _HOUR_S))))
 
 
 def rates_of(table: Table, name: str) -> tuple[float | None, float | None]:

@@ -14,7 +14,6 @@ from pulsetrainer.report.html import page
 
 def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header: Any) -> str:
     """Return the report of a diagnosis, with the commands that come next; ``header`` as in ``html.page``."""
-    shown = [*found.found, *[one for one in found.causes if not one.found and one.explains_percent > 0]][:12]
     return page(
         "diagnosis.html.j2",
         **header,
@@ -22,7 +21,6 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
         words=diagnosis_text,
         commands=commands,
         headline=headline(found),
-        shown=shown,
         ranked=bool(ranked(found)),
     )
 

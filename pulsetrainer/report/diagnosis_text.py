@@ -9,14 +9,14 @@ from itertools import chain, count, pairwise
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
-from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.artefacts.units import more_easily, with_unit
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.diagnosis.wording import joined
 from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
 _NOTHING = 1e-3  # of an interval: a value of less is rounding
-_LONG_TIMES = (" min", " h", " d")  # in seconds a reader would have to divide
+_NARROW = 0.01  # of the value
 _CURVE = re.compile(r"[fg]\d+")  # the values of a learned curve, of a gain: one by one they say nothing
 _OF_A_CURVE = ("state", "low", "high")
 DRAWN = "the report (--html) draws it"
@@ -55,10 +55,10 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
             if stands(found, fields)
         ),
     )
-    others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
     columns = ("cause", "found", "explains, %", "held-out\nshare, %")
-    rows = tuple(_row(one, found) for one in (*found.found, *others))
-    explained = {one.cause: one.text for one in others if one.text}  # those found were told above
+    rows = tuple(_row(one, found) for one in tried(found))
+    # those found were told above
+    explained = {one.cause: one.text for one in tried(found) if one.text and not one.found}
     if tells_shares(found):
         yield Table("causes, strongest first", columns, rows)
         explained = COLUMNS | explained
@@ -68,6 +68,12 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         yield Facts("in this table", explained)
     yield Facts("evidence", {str(k): text for k, text in enumerate(evidence(found), start=1)})
     yield Facts("next", {" " * k: one for k, one in enumerate(found.advice)})
+
+
+def tried(found: Diagnosis) -> list[Cause]:
+    """Return the causes of the table, here and on the page: those found, then the strongest others."""
+    others = [one for one in found.causes if not one.found]
+    return [*found.found, *others[: max(_SHOWN - len(found.found), 0)]]
 
 
 def evidence(found: Diagnosis) -> list[str]:
@@ -129,7 +135,7 @@ def parameters(several: Sequence[Parameter], *, drawn: str = DRAWN) -> dict[str,
     # what was chosen, such as how many time constants there are, comes after what was measured
     for one in sorted(several, key=lambda one: one.chosen):
         if not of_a_curve(one):
-            said[_numbered(one.name, said)] = parameter(one)
+            said[_numbered(one.name, said)] = parameter(one) + _amplitude(one, several)
     values = [one for one in several if _CURVE.fullmatch(one.name)]
     begins = [k for k, one in enumerate(values) if one.name[1:] == values[0].name[1:]]
     for begin, end in pairwise([*begins, len(values)]):
@@ -155,15 +161,24 @@ def of_a_curve(one: Parameter) -> bool:
 def parameter(one: Parameter) -> str:
     """Return a parameter with its unit, its 95 % interval and what it is of."""
     known = math.isfinite(one.lower) and one.lower < one.upper
-    low, high = f"{one.lower:.3g}", f"{one.upper:.3g}"
+    # a narrow interval needs the digits of the value
+    digits = 4 if one.upper - one.lower < _NARROW * abs(one.upper) else 3
+    low, high = f"{one.lower:.{digits}g}", f"{one.upper:.{digits}g}"
     half = max(one.upper - one.value, one.value - one.lower)
     between = f"{low} to {high}" if low != high else f"± {half:.1g}"  # "7 to 7" would tell nothing
     interval = f" (95 %: {between})" if known else ""
     value = one.value if not known or abs(one.value) > _NOTHING * (one.upper - one.lower) else 0.0
     said = with_unit(f"{value:.4g}", one.unit)
-    if one.unit == "s" and (easy := with_seconds(value)).endswith(_LONG_TIMES):
+    if easy := more_easily(value, one.unit):
         said += f" = {easy}"
     return said + interval + (f": {one.meaning}" if one.meaning else "")
+
+
+def _amplitude(one: Parameter, several: Sequence[Parameter]) -> str:
+    """Say behind a cosine how large it is together with its sine."""
+    sine = [s for s in several if "cosine" in one.name and s.name == one.name.replace("cosine", "sine")]
+    size = with_unit(f"{math.hypot(one.value, sine[0].value):.3g}", one.unit) if sine else ""
+    return f"; with the sine, an amplitude of {size}" if sine else ""
 
 
 def rivals(one: Cause) -> str:

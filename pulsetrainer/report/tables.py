@@ -101,13 +101,24 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
             indents = ((line[: -len(said)], said) for line, said in words)
             lines = "\n".join(folded(lead, said, width, len(lead) + 2) for lead, said in indents) + "\n"
         return lines
-    named = [(label(name), text(told(name, value))) for name, value in part.rows.items() if value is not None]
+    named = [(label(name), _told(name, value)) for name, value in part.rows.items() if value is not None]
     longest = max((len(name) for name, _ in named), default=0)
     if width is not None and 2 * longest + 8 > width:  # no room beside the names: below them
         rows = [folded(*one, width) for name, value in named for one in (("  ", name), ("    ", value))]
     else:
         rows = [folded(f"  {name:<{longest}}  " if longest else "  ", value, width) for name, value in named]
     return "\n".join([folded("", part.title, width, indent=2), *rows, ""])
+
+
+def _told(name: str, value: Any) -> str:
+    """Return a value as a person reads it: a long time, a low rate also in other units."""
+    said = text(told(name, value))
+    unit = {"seconds": "s", "rate_Hz": "Hz"}.get(name)
+    if unit is None:
+        return said
+    from pulsetrainer.artefacts.units import more_easily  # noqa: PLC0415  # with it comes numpy
+
+    return " = ".join(filter(None, (said, more_easily(value, unit))))
 
 
 def label(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from pulsetrainer.diagnosis.artefact import diagnosis_of
 from pulsetrainer.diagnosis.question import question_of
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.arguments import named, several
+from pulsetrainer.steps.evaluate import beside_its_fit
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -74,4 +76,7 @@ def diagnose(
     question = question_of(
         whole, model, rng=rng, quick=quick, progress=progress, names=called, named=bool(names)
     )
-    return diagnosis_of(procedure.diagnose(question))
+    found = diagnosis_of(procedure.diagnose(question))
+    why = beside_its_fit(model, whole[0], found.rms_percent) if len(whole) == 1 else ""
+    said = (f"{called[-1]} leaves {found.rms_percent:.3g} % of {called[0]} here: {why}",) if why else ()
+    return replace(found, notes=(*found.notes, *said))

@@ -39,6 +39,7 @@ BEYOND = 0.005  # of the model's range: an input further out than this was never
 _AT_THE_END = 0.1  # of the model's range, for a record that begins there
 _SETTLED = 3.0  # time constants: then a twentieth is left of where a slow cause began
 _SOON = 0.005  # of the record: what has passed within such a time matters little
+_APART = 1.03  # times the error of the fit: so large a one asks for a reason
 _TOLD = 0.1  # % of the samples, in figures
 
 
@@ -172,9 +173,8 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
         if model.fit and model.fit.warning:
             warnings.append(f"{title}: {model.fit.warning}")
         if _is_fitted_to(model, run):
-            raw = "; its fit took the noise of the input out, this prediction does not"
-            noisy = model.fit is not None and model.fit.false_reversals > 0 and model.form != "direct"
-            notes.append(f"{title} was fitted to {name}: only another run shows how good it is{raw * noisy}")
+            own = ("only another run shows how good it is", beside_its_fit(model, run, one.rms_percent))
+            notes.append(f"{title} was fitted to {name}: {'; '.join(filter(None, own))}")
         if one.outside_percent > 0:
             share = f"{one.outside_percent:.1f}" if one.outside_percent >= _TOLD else f"less than {_TOLD}"
             notes.append(
@@ -217,6 +217,15 @@ def _begun_elsewhere(name: str, run: Run, title: str, model: Model) -> list[str]
             f"{with_seconds(_SETTLED * tau_s)} have passed, its {cause} may be another than the device's"
         )
     ]
+
+
+def beside_its_fit(model: Model, run: Run, rms_percent: float) -> str:
+    """Say why a model predicts a run that it was fitted to worse than it fits it; empty where it does not."""
+    fit = model.fit
+    if fit is None or not _is_fitted_to(model, run) or not fit.false_reversals or fit.masked_samples:
+        return ""
+    took = f"its fit ({fit.rms_percent:.3g} % of the span) took the noise of the input out"
+    return f"{took}, this prediction does not" if rms_percent > _APART * fit.rms_percent else ""
 
 
 def _is_fitted_to(model: Model, run: Run) -> bool:

@@ -157,8 +157,8 @@ def _of_loops_that_differ(fitted: Fitted, run: Run, span: float) -> str:
     output, given = _named(run)
     return (
         f"No static form (direct, dual, signed) describes this record: the same swing of the {given} changes "
-        f"the {output} differently from place to place (its minor loops are not congruent). A curve over a "
-        f"quantity that lags, such as its square, misses {100 * found.curve / span:.2g} % of the span where "
-        f"it was not fitted, weights of either sign {100 * found.signed / span:.2g} %. These follow the "
-        "recorded branches and are off after other reversals"
+        f"the {output} differently from place to place (its minor loops are not congruent), as where it is "
+        "the square of a quantity that lags. No model of this program follows that: weights of either sign "
+        f"miss {100 * found.signed / span:.2g} % of the span where they were not fitted, and more after "
+        "other reversals than those recorded, so use this model for inputs like the recorded one"
     )

@@ -127,6 +127,24 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     assert none["filter"] == "0 s (95 %: 0 to 0.0033)"
 
 
+def test_what_is_slow_is_told_in_long_times():
+    """A disturbance that comes once a day, with an interval whose ends differ as much as the value shows."""
+    names = ("sine", "cosine", "frequency", "sine 2", "cosine 2")
+    values = (0.218, 0.2661, 1.155e-5, 3.0, 4.0)
+    several = [
+        Parameter(n, v, "Hz" if n == "frequency" else "%", NAN, NAN)
+        for n, v in zip(names, values, strict=True)
+    ]
+    several[2] = replace(several[2], lower=1.1522e-5, upper=1.1578e-5)
+    said = parameters(several)
+    assert said["frequency"] == "1.155e-05 Hz = once in 24.1 h (95 %: 1.152e-05 to 1.158e-05)"
+    assert said["cosine"].endswith("an amplitude of 0.344 %")
+    assert said["cosine 2"].endswith("an amplitude of 5 %")
+    assert said["sine"] == "0.218 %"
+    rate = Parameter("rate", 1.098e-6, "%/s", 1.07e-6, 1.13e-6)
+    assert parameters([rate])["rate"] == "1.098e-06 %/s = 0.095 %/d (95 %: 1.07e-06 to 1.13e-06)"
+
+
 def test_what_was_measured_comes_before_what_was_chosen():
     """Amplitude and time constant of a creep, then how many time constants it has."""
     chosen, tau = Parameter("middle", 1.0, "1", 1.0, 1.0), Parameter("tau", 1.5, "s", 1.25, 1.75)

@@ -16,6 +16,7 @@ import store_examples
 
 from pulsetrainer.artefacts import Evaluation, Parameter
 from pulsetrainer.report.diagnosis_html import headline, render_diagnosis
+from pulsetrainer.report.diagnosis_text import sections
 from pulsetrainer.report.html import offset, render_evaluation
 
 PUBLISHED = {
@@ -345,6 +346,18 @@ def test_the_report_does_not_send_to_itself_for_a_curve():
     page = render_diagnosis(replace(found, causes=causes), title="", created="", provenance_json="{}")
     assert "what it adds to the output; drawn below" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "--html" not in page
+
+
+def test_page_and_terminal_list_the_same_causes():
+    """Where no cause had a share of the error, the page had an empty table."""
+    found = store_examples.diagnosis()
+    names = ("field-lag", *(f"cause {k}" for k in range(9)))
+    causes = tuple(replace(found.causes[0], cause=one, found=False, explains_percent=0.0) for one in names)
+    for told in (replace(found, verdict="none", causes=causes), found):
+        page = Page(render_diagnosis(told, title="", created="", provenance_json="{}"))
+        table = next(one for one in sections(told) if one.title.startswith("causes"))
+        headings = [text for a, text in page.of("th") if a.get("scope") == "row"]
+        assert headings[-len(table.rows) :] == [row[0] for row in table.rows]
 
 
 def test_the_heading_of_a_diagnosis_is_short():

@@ -212,6 +212,12 @@ def test_figures_stand_beside_their_names_where_there_is_room(width, said):
     assert tables.rendered(tables.Facts("t", {"ab": "c"}), width) == said
 
 
+def test_the_length_and_the_rate_of_a_slow_run_are_told_in_long_times():
+    """A month at two samples an hour; as figures they stay seconds and Hz."""
+    said = tables.rendered(tables.Facts("t", {"seconds": 2.59e6, "rate_Hz": 1 / 1800}))
+    assert said == "t\n  seconds   2.59e+06 = 30 d\n  rate, Hz  0.000556 = once in 30 min\n"
+
+
 def test_a_figure_has_as_many_digits_as_tell_something():
     """A model was `304.05 %` worse than another."""
     known = {93.944: "93.94", 99.99: "99.99", 99.996: "100", -304.05: "-304", 0.01234: "0.0123", 0.0: "0.00"}

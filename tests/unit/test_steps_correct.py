@@ -354,10 +354,10 @@ def test_what_is_told_of_a_step_is_enough_to_compute_it():
     found = pt.diagnose(runs, pt.identify(runs[0], levels=12), names=["a.h5", "b.h5", "m.h5"])
     assert found.verdict == "step"
     told = {one.name: one for one in found.found[0].parameters}
-    assert told["offset"].meaning.startswith("added to the force from then on where that is ")
+    assert told["offset"].meaning.startswith("by which the force is higher from that time on, where it was ")
     middle = float(told["offset"].meaning.split()[-2])
     assert middle < -4.0
-    assert f"distance from {middle:g} N is added as well" in told["gain"].meaning
+    assert f"away from {middle:g} N, this share of the distance comes on top" in told["gain"].meaning
     assert told["offset"].value - told["gain"].value * middle == pytest.approx(0.0, abs=0.05)  # 1.1 y
     at, unit, *where = told["time"].meaning.rpartition(", ")[2].split()
     assert (unit, *where) == ("s", "into", "b.h5")

@@ -20,6 +20,7 @@ from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.files.store import read
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
+from pulsetrainer.steps.diagnose import diagnose
 from pulsetrainer.steps.evaluate import breaches, evaluate
 from pulsetrainer.steps.identify import identify
 
@@ -60,6 +61,21 @@ def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
     notes = [evaluate(run, model, names=["a"], model_names=["m"]).notes for run in runs]
     assert notes[0] == ("m was fitted to a: only another run shows how good it is",)
     assert notes[1] == ()
+
+
+@pytest.mark.parametrize(("noise", "said"), [(0.0, False), (0.01, True)])
+def test_the_fit_of_an_input_without_its_noise_is_better_than_the_prediction_from_it(noise, said):
+    """`evaluate` and `diagnose` told another error of one model and run than `identify`, without a reason."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(U, 2)
+    run = _run(0.001 * rng.standard_normal(u.size), u)
+    run = replace(run, input=u + noise * np.ptp(u) * rng.standard_normal(u.size))
+    model = identify(run, levels=12, form="direct")
+    names = {"names": ["a"], "model_names": ["m"]}
+    told = [evaluate(run, model, **names).notes, diagnose(run, model, quick=True, names=["a", "m"]).notes]
+    assert [any("took the noise of the input out" in note for note in notes) for notes in told] == [said] * 2
+    other = replace(run, output=run.output + 0.001)
+    assert not any("its fit" in note for note in evaluate(other, model, **names).notes)
 
 
 @pytest.mark.parametrize(

@@ -918,6 +918,25 @@ def test_time_that_does_not_increase_is_told_as_the_file_has_it(table, rows, aft
 
 
 @pytest.mark.parametrize(
+    ("minutes", "todo"),
+    [
+        ((100, 110, 120, 130, 140, 150, 160, 170, 120, 130), "winter time: add an hour"),
+        ((100, 110, 120, 130, 140, 150, 120, 130), "offset from UTC"),  # two rows are missing
+        ((0, 60, 120, 120, 180, 240), "winter time"),
+        ((100, 110, 120, 130, 140, 150, 160, 170, 160, 180), "sort the rows"),
+        ((100, 110, 120, 130, 130, 140), "more digits"),
+        ((200, 210, 220, 230, 240, 250, 100, 110), "sort the rows"),
+    ],
+)
+def test_a_clock_that_was_set_back_for_winter_time_is_no_table_to_sort(table, minutes, todo):
+    """Sorted, the two hours would lie among each other."""
+    rows = "".join(f"25.10.2026 {m // 60:02}:{m % 60:02}:00;{k};{k % 3}\n" for k, m in enumerate(minutes))
+    with pytest.raises(DataError) as caught:
+        read_run(table("when;u;y\n" + rows).path, **COLUMNS)
+    assert todo in caught.value.hint
+
+
+@pytest.mark.parametrize(
     ("row", "said"),
     [
         ("1e6;0,5;abc", "'abc' in column y, line {line}: not a number"),

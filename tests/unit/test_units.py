@@ -14,6 +14,7 @@ from pulsetrainer.artefacts.units import (
     check_unit,
     counted,
     is_unit,
+    more_easily,
     same_units,
     shown,
     split_unit,
@@ -230,6 +231,21 @@ def test_how_a_quantity_is_measured_is_no_part_of_its_unit(written, unit):
     assert symbol_of(written) == unit
 
 
+@pytest.mark.parametrize(
+    ("heading", "unit"),
+    [
+        ("Water content [vol%]", "vol%"), ("theta (Vol.-%)", "vol%"), ("Wassergehalt Vol%", "vol%"),
+        ("S [10^-3]", "‰"), ("S (1e-3)", "‰"), ("S / 10⁻³", "‰"), ("S [10**-6]", "ppm"),
+        ("strain_ustrain", "µε"), ("eps [microstrain]", "µε"), ("eps [µε]", "µε"),
+        ("eps [\N{GREEK SMALL LETTER MU}ε]", "µε"),
+    ],
+)  # fmt: skip
+def test_a_share_is_read_as_people_write_it(heading, unit):
+    """Also as an option; of 10^-3 the hint was to write 1, without the factor."""
+    written = split_unit(heading)[1]
+    assert check_unit(symbol_of(written), "input unit") == check_unit(written, "--input-unit") == unit
+
+
 @pytest.mark.parametrize(("wrong", "unit"), [("mbar foo", "mbar"), ("mBar", "mbar"), ("degrees", "deg")])
 def test_the_unit_that_is_offered_first_has_the_same_prefix(wrong, unit):
     """Another one is off by a factor of a thousand."""
@@ -265,6 +281,12 @@ def test_no_units(text):
         check_unit(text, "input unit", "the heading 'x' of a.csv")
 
 
+def test_the_hint_for_an_unknown_share_keeps_its_factor():
+    """Only 1 was named for numbers without a unit."""
+    with raises(DataError, "no such share", place="the heading 'x' of a.csv"):
+        check_unit("thousandths", "input unit", "the heading 'x' of a.csv")
+
+
 @pytest.mark.parametrize(
     ("template", "u", "unit"),
     [("{y} s/{u}", "kA/m", "T s/(kA/m)"), ("{y} s/{u}", "A", "T s/A"), ("{u}/{y}", "N mm", "N mm/T"),
@@ -293,6 +315,20 @@ def test_a_pure_number_is_no_factor_of_a_unit():
 def test_a_time_is_told_in_the_unit_that_fits(seconds, said):
     """From nanoseconds to days."""
     assert with_seconds(seconds) == said
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (2.59e6, "s", "30 d"), (599.0, "s", ""), (1.155e-5, "Hz", "once in 24.1 h"), (0.1, "Hz", ""),
+        (0.05, "Hz", "once in 20 s"), (0.0, "Hz", ""), (1.098e-6, "%/s", "0.095 %/d"),
+        (-5e-4, "N/s", "-0.03 N/min"), (5e-6, "mm/m/s", "0.018 mm/m/h"), (1e-3, "N/s", ""), (0.0, "N/s", ""),
+        (1e-9, "N/s", "8.6e-05 N/d"), (1e-6, "N", ""),
+    ],
+)  # fmt: skip
+def test_what_is_slow_is_told_in_longer_times(value, unit, said):
+    """A day is no 1.155e-05 Hz to anybody."""
+    assert more_easily(value, unit) == said
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,12 @@ class Step(Cause):
     strengths = 2
     parameters = (
         Quantity(
-            "offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output} from then on where that is {empty}"
+            "offset",
+            "{y}",
+            -1e6,
+            1e6,
+            1e-4,
+            "by which the {output} is higher from that time on, where it was {empty}",
         ),
         Quantity(
             "gain",
@@ -46,9 +51,9 @@ class Step(Cause):
             -0.9,
             0.9,
             1e-4,
-            "change of the gain: this share of the distance from {empty} is added as well",
+            "change of the gain: away from {empty}, this share of the distance comes on top",
         ),
-        Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
+        Quantity("time", "s", 0.0, 1e6, 0.01, "at which it changed, since the first sample"),
     )
     sudden = True
     moves_zero = True
