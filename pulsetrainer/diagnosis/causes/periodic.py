@@ -1,4 +1,4 @@
-"""a disturbance at a fixed frequency (mains, fan): y + A sin(2 pi f t) + B cos(2 pi f t)."""
+"""a disturbance at a fixed frequency (mains, a fan, day and night): y + A sin(2 pi f t) + B cos(2 pi f t)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Periodic(Cause):
     """A sine of fixed frequency, locked to the clock."""
 
     id = "periodic"
-    title = "a disturbance at a fixed frequency (mains, fan)"
+    title = "a disturbance at a fixed frequency (mains, a fan, day and night)"
     formula = "y + A sin(2 pi f t) + B cos(2 pi f t)"
     signature = "one line in the spectrum of the residual, at rest and in motion alike"
     excitation = "a rest of a few periods"
