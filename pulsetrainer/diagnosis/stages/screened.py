@@ -9,10 +9,10 @@ the joint fit.
 
 The same draws show how small an effect of each cause would have been seen. Such an effect is large enough
 that the test finds it in nine of ten records, and that what the weights leave of it is relevant even if that
-is a third less than of the effects that are tried. Both hold even if what already looks like the cause in
-this record works against it. For a cause that has entered the model since, the present noise is used. For a
-cause that the weights can absorb almost entirely no such figure is given: what they leave of it depends only
-on how fine the levels are.
+is little more than half of what they leave of the effects that are tried. Both hold even if what already
+looks like the cause in this record works against it. For a cause that has entered the model since, the
+present noise is used. For a cause that the weights can absorb almost entirely no such figure is given: what
+they leave of it depends only on how fine the levels are.
 """
 
 from __future__ import annotations
