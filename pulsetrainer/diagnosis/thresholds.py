@@ -103,9 +103,7 @@ class Thresholds:
 
     # Screening and its null
     p_max: float = 0.01  # over the whole library: in a hundred searches one false alarm is accepted
-    share_unsure: float = (
-        1.5  # that the weights leave of an effect: at its limit by relevance half were missed
-    )
+    share_unsure: float = 1.8  # times: what weights leave of an effect is unsure; at 1 half were missed
     nine_of_ten: float = 1.2816  # standard deviations above the limit: nine of ten such effects are found
     halves: tuple[float, float, int] = (1.0, 200.0, 4000)  # half squares among which a line's limit is sought
     slow_noise: float = 3.0  # times the noise from sample to sample: an average with more contains slow noise
