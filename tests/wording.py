@@ -183,13 +183,13 @@ MESSAGES = {
     "not our device": Message("not a pulsetrainer device", "pulsetrainer ports", "{port}"),
     "nobody answers": Message("nobody answers", "has power", "{port}"),
     "older device": Message("the device is older", "flash the firmware", "", "{ours}", "{theirs}"),
-    "older program": Message("the program is older", "pip install --upgrade", "", "{ours}", "{theirs}"),
+    "older program": Message("the program is older", "git pull", "", "{ours}", "{theirs}"),
     "beyond the limit": Message(
-        "the current", "--current-max", expected="the limit in force is {limit} A", got="goes up to {got} A"
+        "the current", "--current-max", expected="the limit is {limit} A", got="goes up to {got} A"
     ),
     "limit raised": Message("limit", "lowered", expected="1.5 A", got="9 A"),
-    "tripped while conditioning": Message("force above its limit", "--limit-force", "conditioning", got=" N"),
-    "force-high": Message("force above its limit", "--limit-force", "during the capture", got=KEPT),
+    "tripped while conditioning": Message("force above its limit", "raise --limit-force", "conditioning", got=" N"),
+    "force-high": Message("force above its limit of 15 N", "--current-max", "during the capture", got=KEPT),
     "current-rail": Message("current above its hard limit", "plug", "during the capture", got=KEPT),
     "force-frozen": Message("force reading", "cause", "during the capture", got=KEPT),
     "force reading": Message("force", "sensor"),
@@ -213,12 +213,12 @@ MESSAGES = {
         "a coil cannot be measured",
         "--limit-current",
         expected="below {least} A",
-        got="the limit in force is {limit} A",
+        got="the limit is {limit} A",
     ),
     "a quiz without a terminal": Message("answered on the keyboard", "in a file", got="no live view"),
     "another supply": Message("does not fit the voltage", "the supply", "during {during}"),
     "limit below the model's range": Message(
-        "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
+        "the current goes up", "--limit-current", expected="the limit is {limit} A", got="{got} A"
     ),
     "lost on the wire": Message("samples of the", "check the cable", got="were lost on the wire"),
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),

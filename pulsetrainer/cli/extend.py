@@ -39,6 +39,11 @@ def extend(
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
         plain = job.load(model, pt.Model)
+        if verify is not None and likely_kind(verify) == "model":
+            raise DataError(
+                f"{verify} (--verify) is a model, expected a run",
+                hint="give one that served neither it nor the diagnosis",
+            )
         other = None if verify is None else job.load(verify, pt.Run)
         try:
             extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))

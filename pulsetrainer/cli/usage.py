@@ -11,11 +11,12 @@ from typing import Any
 
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.input_file import columns_of, spaced
+from pulsetrainer.files.input_file import columns_of, likely_kind, spaced
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
 _EXAMPLES = {
+    "--bootstrap": "--bootstrap 200 is usual",
     "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
 }
@@ -25,6 +26,7 @@ _INSTEAD = {
     "check": "-o names the file that --update writes: pulsetrainer check model.h5 --update -o {extra}",
     "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
     "ports": "to look at one: pulsetrainer doctor --port {extra}",
+    "correct": "a diagnosis is an option: --diagnosis {extra}",
     "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
     "invert": "one pulse at a time: run it once for each, with an output of its own",
     "capture": "one signal at a time: run it once for each, with an output of its own",
@@ -32,10 +34,17 @@ _INSTEAD = {
 }
 # of them, those that are no file's name
 _NO_FILE = {"ports", "doctor"}
+_SWITCHED = ("yes", "no", "true", "false", "on", "off")
 _SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")  # that typer writes a completion for
 _NO_COMMAND = {
     "version": "pulsetrainer --version",
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
+    "predict": "evaluate predicts a run: pulsetrainer evaluate run.h5 --model model.h5",
+    "record": "pulsetrainer capture identification -o run.h5",
+    "measure": "pulsetrainer capture identification -o run.h5",
+    "fit": "pulsetrainer identify run.h5 -o model.h5",
+    "calibrate": "of a model: pulsetrainer capture identification -o run.h5; of a coil: pulsetrainer tune",
+    "simulate": "the simulated device is the port bench:, which is the default: pulsetrainer capture --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
 _NO_OPTION = {
@@ -43,6 +52,10 @@ _NO_OPTION = {
     "play --model": "leave it out: a drive holds the model that it was made with",
     "refine --model": "leave it out: a drive holds the model that it was made with",
     "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
+    "invert --amplitude": "the height of a drive is a force: --force-max, and --force-min",
+    "ports --port": "to look at one: pulsetrainer doctor --port PORT",
+    "--version": "pulsetrainer --version",
+    "--port": "leave it out: the command works on files, and needs no device",
     "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
 _LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
@@ -65,7 +78,9 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         hint = f"did you mean {' or '.join(near)}?" if near else _elsewhere(given, context, words) or help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
-        known = _NO_OPTION.get(f"{name} {given}", "").format(behind=behind)
+        known = (_NO_OPTION.get(f"{name} {given}") or _NO_OPTION.get(given, "")).format(behind=behind)
+        if Path(given).is_file():
+            known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -93,7 +108,7 @@ def check_apart(words: Sequence[str]) -> None:
             name = shlex.quote(word.partition("=")[2] or behind)
             raise UsageError(
                 f"there is no option {word}: give the file to write after -o and a space",
-                hint=f"-o {name}" + f"; for a column, two dashes: --output {name}" * ("import" in words),
+                hint=f"for a column, two dashes: --output {name}" if "import" in words else f"-o {name}",
             )
         if word.startswith(_LONG_DASHES) and not Path(word).exists():
             short = word.lstrip("".join(_LONG_DASHES))
@@ -161,6 +176,9 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
             first, second = map(shlex.quote, (columns[1:3] if len(columns) > 2 else columns))
             said += f"; {given[0]} has {', '.join(columns)}"
             like = f"name two of them, such as --input {first} --output {second}"
+    typed = context.meta.get("pulsetrainer.cli.naming", ()) if context is not None else ()
+    if parameter.name == "model" and (loose := [one for one in typed if likely_kind(Path(one)) == "model"]):
+        like = f"a model is an option: --model {shlex.quote(loose[0])}"
     return UsageError(said, hint=like)
 
 
@@ -214,6 +232,10 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
         instead = "the file to write is an option: pulsetrainer tune -o {extra}"
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
+    if name == "check" and Path(extra).exists():
+        instead = "one model at a time: run it once for each"
+    if extra.lower() in _SWITCHED:
+        instead = "leave it out: a switch takes no value; some have an opposite, such as --no-condition"
     beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
     beside += "pulsetrainer compare a.h5 b.h5"
     return UsageError(
