@@ -691,11 +691,11 @@ INSIDE = {
     ),
     "repeats for a fortnight": Mistake(
         ("capture", "identification", "-o", "out.h5", "--repeats", "100000"),
-        *(3, "--repeats 100000 times 98001 samples", "far fewer --repeats: 10203"),
+        *(3, "--repeats 100000 times 98001 samples", "far fewer --repeats; at most 10203"),
     ),
     "a pulse in milliseconds": Mistake(
         ("invert", "slow.csv", "--model", "model.h5", "-o", "out.h5"),
-        *(3, "4 periods of slow last 3240 s", "write its unit in the heading, such as t_ms"),
+        *(3, "4 periods of slow last 4080 s", "write its unit in the heading, such as t_ms"),
     ),
     "two tables of different headings": Mistake(
         (*("import", "force.csv", "load.csv", "--input", "current_A", "--output", "force_N"), "-o", "out.h5"),
@@ -736,6 +736,14 @@ INSIDE = {
             *("--answers", "many.txt"),
         ),
         *(3, "many.txt has 9 answers to 4 questions", "as many as questions"),
+    ),
+    "a model to verify with": Mistake(
+        ("extend", "run.h5", "--model", "model.h5", "--verify", "model.h5", "-o", "out.h5"),
+        *(
+            3,
+            "model.h5 (--verify) is a model, expected a run",
+            "one that served neither it nor the diagnosis",
+        ),
     ),
     "a run for a model": Mistake(
         ("invert", "normal", "--model", "run.h5", "-o", "out.h5"),

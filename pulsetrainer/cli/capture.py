@@ -138,7 +138,7 @@ def _of_options(context: Context, signal: str, top_A: float, *, own: bool) -> li
         told.append(f"{option} does not count here{but}: the signal {signal} has its own")
     step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
     if by_us and step_A > level_A:
-        far = f"the current moves {step_A:.3g} A a sample, past {step_A / level_A:.2g} levels"
-        far += ", which a model will miss"
+        far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
+        far += f", {step_A / level_A:.0f} at a time, which a model will miss" * (step_A > 2 * level_A)
         told.append(f"{far}: lower --speed, or raise --rate")
     return told

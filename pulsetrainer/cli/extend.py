@@ -33,17 +33,17 @@ def extend(
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
     job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
+    if verify is not None and likely_kind(verify) == "model":
+        raise DataError(
+            f"{verify} (--verify) is a model, expected a run",
+            hint="give one that served neither it nor the diagnosis",
+        )
     from pulsetrainer.files import provenance, store
     from pulsetrainer.report import diagnosis_results, facts
 
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
         plain = job.load(model, pt.Model)
-        if verify is not None and likely_kind(verify) == "model":
-            raise DataError(
-                f"{verify} (--verify) is a model, expected a run",
-                hint="give one that served neither it nor the diagnosis",
-            )
         other = None if verify is None else job.load(verify, pt.Run)
         try:
             extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))

@@ -116,13 +116,11 @@ def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
     for one in context.command.params:
         about = rf"{one.opts[0]}(?![\w-])" + "|there is no port " * (one.name == "port")
         if re.search(about, said) and (elsewhere := set_by(one, context)):
-            in_place = f"({one.opts[0]})" in said  # of a limit: what else can be done still holds
-            error.message = (
-                said.replace(f"({one.opts[0]})", f"({elsewhere[0]})")
-                if in_place
-                else f"{error.message} (it comes from {elsewhere[0]})"
-            )
-            error.hint = elsewhere[1] + ("; or " + error.hint.partition("; or ")[2]) * in_place
+            error.message = said.replace(f"({one.opts[0]})", f"({elsewhere[0]})")
+            if error.message == said:
+                error.message += f" (it comes from {elsewhere[0]})"
+            _, also, other = error.hint.partition("; or ")  # what else can be done still holds
+            error.hint = elsewhere[1] + also + other
 
 
 def _check_names(parameter: Any, typed: Any) -> None:

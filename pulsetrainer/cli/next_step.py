@@ -59,12 +59,8 @@ def next_step(problem: errors.PulsetrainerError) -> str:
         return _after_wrong_kind(problem)
     if isinstance(problem, errors.DamagedFileError):
         known = problem.artefact in MAKES
-        how = (
-            f"with `{to_make(problem.artefact, problem.path)} --overwrite`"
-            if known
-            else "(see pulsetrainer --help)"
-        )
-        return f"restore it from a copy, or make it again {how}"
+        how = f"with `{to_make(problem.artefact, problem.path)} --overwrite`" if known else ""
+        return f"restore it from a copy, or make it again {how or '(see pulsetrainer --help)'}"
     if isinstance(problem, errors.NotAnArtefactError) and not problem.foreign:
         if problem.path.suffix.lower() in _TABLES:
             table = shlex.quote(str(problem.path))
@@ -142,16 +138,11 @@ def _after_wrong_kind(problem: errors.WrongKindError) -> str:
     if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
         return f"give each model after a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
-    beside = ""
+    known = next(filter(None, (_NEXT.get((kind, problem.found)) for kind in problem.expected)), "")
+    for name in re.findall(r"-o ([\w.]+)", known):
+        known = known.replace(name, str(free(Path(name))))
+    ways = [known.format(file=shlex.quote(str(problem.path)))] if known else []
     if near := near_names(problem.path, problem.expected):
         files = ", ".join(shlex.quote(str(problem.path.with_name(name))) for name in near)
-        beside = f"{problem.hint.removesuffix(' instead')}, such as {files}"
-    for kind in problem.expected:
-        if known := _NEXT.get((kind, problem.found)):
-            for name in re.findall(r"-o ([\w.]+)", known):
-                known = known.replace(name, str(free(Path(name))))
-            known = known.format(file=shlex.quote(str(problem.path)))
-            return f"{beside}; or {known}" if beside else known
-    if beside:
-        return beside
-    return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
+        ways.insert(0, f"{problem.hint.removesuffix(' instead')}, such as {files}")
+    return "; or ".join(ways) or f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"

@@ -42,7 +42,7 @@ def check_size(times: int, samples: float, most: int = MOST_SAMPLES, what: str =
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
             f"`{what}` {str(times)[:20]} times {samples:.6g} samples are more than {most:,}",
-            hint=f"give far fewer `{what}`: {int(most // samples)} are the most that can be recorded"
+            hint=f"give far fewer `{what}`; at most {int(most // samples)} can be recorded"
             if 0 < samples <= most
             else "give fewer, or shorter ones",
         )
