@@ -148,7 +148,7 @@ def parse_bench(port: str) -> BenchOptions:
         elif name == "serial":
             asked = replace(asked, serial=_number_of_device(value))
         else:
-            if name == "seed" and "." in value:
+            if name == "seed" and re.fullmatch(r"\d+\.\d*", value):
                 _number_of_device(value, "seed")
             asked = replace(asked, settings=(*asked.settings, (name, value)))
     return asked
