@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pulsetrainer.cli.instead import INSTEAD, NO_COMMAND, NO_FILE, NO_OPTION, SHELLS, SWITCHED
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.input_file import columns_of, likely_kind, spaced
@@ -19,44 +20,6 @@ _EXAMPLES = {
     "--bootstrap": "--bootstrap 200 is usual",
     "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
-}
-# what is often given as an argument to a command that has none of that kind
-_INSTEAD = {
-    "session": "pulses are separated by commas, a model is an option: --pulses normal,bifid --model model.h5",
-    "check": "-o names the file that --update writes: pulsetrainer check model.h5 --update -o {extra}",
-    "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
-    "ports": "to look at one: pulsetrainer doctor --port {extra}",
-    "correct": "a diagnosis is an option: --diagnosis {extra}",
-    "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
-    "invert": "one pulse at a time: run it once for each, with an output of its own",
-    "capture": "one signal at a time: run it once for each, with an output of its own",
-    "play": "one drive at a time; a drive already holds what is needed of its model",
-}
-# of them, those that are no file's name
-_NO_FILE = {"ports", "doctor"}
-_SWITCHED = ("yes", "no", "true", "false", "on", "off")
-_SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")  # that typer writes a completion for
-_NO_COMMAND = {
-    "version": "pulsetrainer --version",
-    "help": "pulsetrainer --help, or pulsetrainer identify --help",
-    "predict": "evaluate predicts a run: pulsetrainer evaluate run.h5 --model model.h5",
-    "record": "pulsetrainer capture identification -o run.h5",
-    "measure": "pulsetrainer capture identification -o run.h5",
-    "fit": "pulsetrainer identify run.h5 -o model.h5",
-    "calibrate": "of a model: pulsetrainer capture identification -o run.h5; of a coil: pulsetrainer tune",
-    "simulate": "the simulated device is the port bench:, which is the default: pulsetrainer capture --help",
-    "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
-}
-_NO_OPTION = {
-    "check --model": "give the model without an option: pulsetrainer check model.h5",
-    "play --model": "leave it out: a drive holds the model that it was made with",
-    "refine --model": "leave it out: a drive holds the model that it was made with",
-    "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
-    "invert --amplitude": "the height of a drive is a force: --force-max, and --force-min",
-    "ports --port": "to look at one: pulsetrainer doctor --port PORT",
-    "--version": "pulsetrainer --version",
-    "--port": "leave it out: the command works on files, and needs no device",
-    "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
 _LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
@@ -78,7 +41,7 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         hint = f"did you mean {' or '.join(near)}?" if near else _elsewhere(given, context, words) or help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
-        known = (_NO_OPTION.get(f"{name} {given}") or _NO_OPTION.get(given, "")).format(behind=behind)
+        known = (NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")).format(behind=behind)
         if Path(given).is_file():
             known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
@@ -122,7 +85,7 @@ def check_apart(words: Sequence[str]) -> None:
         raise UsageError(
             f"{first} is for the shell it runs in and takes no value, got {second}",
             hint=f"run it in {second}, or let it print: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
-            if second in _SHELLS
+            if second in SHELLS
             else f"write {first} alone",
         )
 
@@ -211,8 +174,8 @@ def _command_for(word: str, near: str, parsed: Any, words: Sequence[str]) -> str
     """What to type in the place of a word that is no command: a file, a line in quotes, capitals."""
     if word == "help" and (of := [word for word in words if word in parsed.commands]):
         return f"pulsetrainer {of[0]} --help"
-    if word in _NO_COMMAND:
-        return _NO_COMMAND[word]
+    if word in NO_COMMAND:
+        return NO_COMMAND[word]
     first = word.strip().partition(" ")[0]
     if first != word and first in parsed.commands:
         return f"leave out the quotes: pulsetrainer {word}"
@@ -227,14 +190,14 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
     taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
-    instead = _INSTEAD.get(name, "{command} --help")
+    instead = INSTEAD.get(name, "{command} --help")
     if name == "tune" and Path(extra).suffix == ".toml":
         instead = "the file to write is an option: pulsetrainer tune -o {extra}"
-    if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
+    if name in NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
     if name == "check" and Path(extra).exists():
         instead = "one model at a time: run it once for each"
-    if extra.lower() in _SWITCHED:
+    if extra.lower() in SWITCHED:
         instead = "leave it out: a switch takes no value; some have an opposite, such as --no-condition"
     beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
     beside += "pulsetrainer compare a.h5 b.h5"
