@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar, Final
 
+UPDATE: Final = "update pulsetrainer in the folder that it came in (git pull, then make install)"
 TRY: Final = "try: "  # the note with which a traceback shows a hint begins so
 
 

@@ -19,7 +19,7 @@ def _shipped(name: str) -> Path:
             return candidate
     raise DataError(
         f"the folder {name}/ that ships with pulsetrainer is missing beside {_PACKAGE}",
-        hint="reinstall the package: pip install --force-reinstall pulsetrainer",
+        hint="install it again, in the folder that it came in: make install",
     )
 
 

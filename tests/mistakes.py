@@ -38,6 +38,8 @@ def lay_out(folder: Path) -> None:
     (folder / "pulse.toml").write_text("normal = 3\n")
     (folder / "round.toml").write_text('"normal.continuous.mean_error_reduction_percent" = [98, 90]\n')
     (folder / "words.toml").write_text('"normal.continuous.mean_error_reduction_percent" = ["a", "b"]\n')
+    (folder / "-run.h5").write_bytes(SIGNATURE)
+    (folder / "back.toml").write_text('port = "C:\\Users"\n')
     (folder / "loop.csv").symlink_to("loop.csv")
     (folder / "one.toml").write_text('"normal.continuous.mean_error_reduction_percent" = 90\n')
 
@@ -213,7 +215,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force in another unit": (
         *("invert normal --model model.h5 -o out.h5 --force-max 20kN", 2, "got '20kN'"),
-        "in N, without the unit: 20000; or, of a model in other units, in its own",
+        "in N, without the unit: 20000\n",
     ),
     "an option of another command": (
         "identify run.h5 --model model.h5 -o out.h5",
@@ -321,7 +323,80 @@ _WORDS_OF_A_TIRED_HAND = {
         *("identify run.h5 -o=out.h5", 2, "there is no option -o=out.h5", "-o out.h5"),
     ),
     "a column behind one dash": (
-        *("import x.csv -output force -o out.h5", 2, "no option -output", "two dashes: --output force"),
+        *("import x.csv -output force -o out.h5", 2, "no option -output", "for a column, two dashes"),
+    ),
+    "a word for a switch": (
+        *("capture identification -o out.h5 --condition no", 2, "got no as well", "a switch takes no value"),
+    ),
+    "two models to check": ("check model.h5 run.h5", 2, "got run.h5 as well", "one model at a time"),
+    "a pulse and a model exchanged": (
+        *("invert model.h5 --model normal -o out.h5", 3, "normal (--model) does not exist"),
+        "pulsetrainer invert normal --model model.h5",
+    ),
+    "a delay below zero": (
+        *("correct run.h5 --delay -0.001 -o out.h5", 2, "got -0.001", "such as --delay 0.001"),
+    ),
+    "a single draw": (
+        *("identify run.h5 -o out.h5 --bootstrap 1", 2, "--bootstrap must be 0, or from 2", "200 is usual"),
+    ),
+    "one number twice": (
+        *(
+            "play drive.h5 -o out.h5 --repeats 5 --repeats 6",
+            2,
+            "--repeats was given 2 times",
+            "give it once",
+        ),
+    ),
+    "a rate with its unit": (
+        *(
+            "session --model model.h5 -o out.h5 --rate 75bpm",
+            2,
+            "got '75bpm'",
+            "the number alone, in bpm: 75",
+        ),
+    ),
+    "a word of others for evaluate": (
+        "predict run.h5",
+        2,
+        "'predict'",
+        "pulsetrainer evaluate run.h5 --model",
+    ),
+    "a word of others for capture": (
+        "record -o out.h5",
+        2,
+        "'record'",
+        "pulsetrainer capture identification",
+    ),
+    "another word for capture": ("measure", 2, "'measure'", "pulsetrainer capture identification"),
+    "a word of others for identify": ("fit run.h5", 2, "'fit'", "pulsetrainer identify run.h5"),
+    "a word of others for two things": ("calibrate", 2, "'calibrate'", "of a coil: pulsetrainer tune"),
+    "a word of others for the bench": ("simulate normal", 2, "'simulate'", "the port bench:, which is the"),
+    "a port where none goes": ("identify run.h5 -o out.h5 --port bench:", 2, "no option --port", "no device"),
+    "a height as a share": (
+        *("invert normal --model model.h5 -o out.h5 --amplitude 50", 2, "--amplitude", "--force-max"),
+    ),
+    "a port to look at": ("ports --port /dev/ttyUSB0", 2, "no option --port", "pulsetrainer doctor --port"),
+    "a version behind a command": ("identify --version", 2, "no option --version", "pulsetrainer --version"),
+    "a diagnosis without its option": (
+        *("correct run.h5 diagnosis.h5 -o out.h5", 2, "got diagnosis.h5", "--diagnosis diagnosis.h5"),
+    ),
+    "a name that begins with a dash": (
+        *("identify -run.h5 -o out.h5", 2, "no option -run.h5", "begins with a dash: ./-run.h5"),
+    ),
+    "a word of another option": (
+        *("identify run.h5 -o out.h5 --method relay", 2, "--method 'relay'", "option: --reading relay"),
+    ),
+    "a pulse of the library with an ending": (
+        *("invert normal.csv --model model.h5 -o out.h5", 3, "normal.csv (argument", "without .csv"),
+    ),
+    "a model updated over itself": (
+        *("check model.h5 --update -o model.h5 --overwrite", 2, "would be lost", "name another file"),
+    ),
+    "a seed that is a fraction": (
+        *("capture identification -o out.h5 --port bench:?seed=1.5", 2, "seed=1.5 is not a whole", "bench:"),
+    ),
+    "a backslash in the settings": (
+        *("--settings back.toml show run.h5", 2, "back.toml cannot be read", "into single quotes"),
     ),
     "help behind one dash": ("identify -help", 2, "no option -help", "pulsetrainer identify --help"),
     "a version that is a command": (
@@ -377,7 +452,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a delay that is no number": (
         *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay nan", 2),
-        *("--delay must be a finite number, 0 or more, got nan", "leave it out for the usual 0"),
+        *("--delay must be a finite number, 0 or more, got nan", "in s, such as --delay 0.001"),
     ),
     "a rate without end": (
         *("import run.csv --input u --output y -o out.h5 --rate inf", 2),
@@ -523,6 +598,18 @@ TABLES = {
     "cells.csv": "t,I,F\n0,5mA,1N\n1,6mA,2N\n2,7mA,3N\n",
     "my pulse.csv": "t_s,force_N\n0,0\n1,1\n2,0\n",
     "twice.csv": "t,x,x\n0,1,2\n1,2,3\n",
+    "low.toml": "[limits]\ncurrent_A = 0.5\n",
+    "newton.toml": "[limits]\nforce_N = 4.0\n",
+    "gone.toml": 'port = "/dev/ttyUSB99"\n',
+    "slow.csv": "t,p\n0,0\n400,1\n600,0\n810,0\n",
+    "load.csv": "t_s,current_A,load_N\n0,0,0\n1,1,1\n2,2,2\n",
+    "force.csv": "t_s,current_A,force_N\n0,0,0\n1,1,1\n2,2,2\n",
+    "page.csv": "<!DOCTYPE html>\n<html>, , </html>\n",
+    "paper.pdf": "%PDF-1.4\n1 0 obj\n",
+    "one.csv": "t_s,current_A\n0,0\n",
+    "press.csv": "t_s,current_A\n0,0\n1,1.4\n2,0\n",
+    "many.txt": "normal\n" * 9,
+    "bad.wav": "RIFF\x04\0\0\0WAVE",
     "excel.csv": "Zeit (s);Strom (A);Kraft (N)\n0,000;0,10;1.234,5\n0,001;0,20;1.235,5\n",
 }
 INSIDE = {
@@ -564,12 +651,110 @@ INSIDE = {
         ("check", "model.h5", "--limit-current", "0.005"),
         *(
             3,
-            "the limit in force is 0.005 A",
-            "--limit-current to 1.5 or leave it out, where it was",
+            "the limit is 0.005 A (--limit-current)",
+            "capture identification --current-max 0.005 -o new.h5",
+        ),
+    ),
+    "a limit of the settings": Mistake(
+        ("--settings", "low.toml", "play", "drive.h5", "-o", "out.h5"),
+        *(
+            3,
+            "the limit is 0.5 A (limits.current_A in low.toml)",
+            "correct it there, or give --limit-current; or",
+        ),
+    ),
+    "a limit of the force in the settings": Mistake(
+        ("--settings", "newton.toml", "play", "drive.h5", "-o", "out.h5"),
+        *(4, "the limit is 4 N (limits.force_N in newton.toml)", "give --limit-force; or capture again"),
+    ),
+    "a force above its limit": Mistake(
+        (*EXCITATION, "-o", "out.h5", "--limit-force", "5"),
+        *(4, "force above its limit of 5 N", "raise --limit-force (the device's own is 15 N), or"),
+    ),
+    "a port of the settings": Mistake(
+        ("--settings", "gone.toml", "play", "drive.h5", "-o", "out.h5"),
+        *(4, "(it comes from port in gone.toml)", "correct it there, or give --port"),
+    ),
+    "a port of Windows": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "COM3"), 4, "no port COM3", "COM ports are of Windows"
+    ),
+    "a port without its folder": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "ttyUSB99"), 4, "no port", "--port /dev/ttyUSB99"
+    ),
+    "heat of a coil that is not known": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--track-heat"),
+        *(3, "does not know the resistance of its coil", "leave --track-heat out, or make the model anew"),
+    ),
+    "a model to be resumed": Mistake(
+        ("capture", "identification", "-o", "model.h5", "--resume"),
+        *(2, "model.h5 is a model, no interrupted recording", "name the recording that broke off"),
+    ),
+    "repeats for a fortnight": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--repeats", "100000"),
+        *(3, "--repeats 100000 times 98001 samples", "far fewer --repeats; at most 10203"),
+    ),
+    "a pulse in milliseconds": Mistake(
+        ("invert", "slow.csv", "--model", "model.h5", "-o", "out.h5"),
+        *(3, "4 periods of slow last 4080 s", "write its unit in the heading, such as t_ms"),
+    ),
+    "two tables of different headings": Mistake(
+        (*("import", "force.csv", "load.csv", "--input", "current_A", "--output", "force_N"), "-o", "out.h5"),
+        *(3, "load.csv has no column 'force_N'", "by its number: 1 is the first"),
+    ),
+    "a comma in a parameter of the bench": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--port", "bench:?creep=0,05"),
+        *(2, "creep=0,05 is not a number", "write it with a point: creep=0.05"),
+    ),
+    "a web page": Mistake(
+        ("import", "page.csv", "--input", "1", "--output", "2", "-o", "out.h5"), 3, "is a web page", "as CSV"
+    ),
+    "a paper": Mistake(
+        ("import", "paper.pdf", "--input", "1", "--output", "2", "-o", "out.h5"), 3, "is a PDF", "as CSV"
+    ),
+    "a sound without its format": Mistake(
+        ("import", "bad.wav", "--input", "1", "--output", "2", "-o", "out.h5"),
+        *(3, "bad.wav is not a whole .wav file that can be read: it lacks its format", "save it again"),
+    ),
+    "a model without its option, for a session": Mistake(
+        ("session", "model.h5", "-o", "out.h5"), 2, "--model is missing", "an option: --model model.h5"
+    ),
+    "steps far too fine": Mistake(
+        (
+            *("import", "force.csv", "--input", "current_A", "--output", "force_N", "--resample", "1e12"),
+            *("-o", "out.h5"),
+        ),
+        *(2, "--resample to steps of 1e-12 s", "give --resample even"),
+    ),
+    "a table beyond the current": Mistake(
+        ("capture", "press.csv", "-o", "out.h5", "--current-max", "0.5"),
+        *(2, "press.csv goes up to 1.4 A, more than --current-max 0.5", "scale the table"),
+    ),
+    "a signal of one row": Mistake(("capture", "one.csv", "-o", "out.h5"), 3, "has 1 row", "a row for each"),
+    "more answers than questions": Mistake(
+        (
+            *("session", "--model", "model.h5", "-o", "out.h5", "--quiz", "4", "--pulses", "normal,bifid"),
+            *("--answers", "many.txt"),
+        ),
+        *(3, "many.txt has 9 answers to 4 questions", "as many as questions"),
+    ),
+    "a model to verify with": Mistake(
+        ("extend", "run.h5", "--model", "model.h5", "--verify", "model.h5", "-o", "out.h5"),
+        *(
+            3,
+            "model.h5 (--verify) is a model, expected a run",
+            "one that served neither it nor the diagnosis",
+        ),
+    ),
+    "a run for a model": Mistake(
+        ("invert", "normal", "--model", "run.h5", "-o", "out.h5"),
+        *(
+            3,
+            "got a run",
+            "give a model, such as model.h5; or run `pulsetrainer identify run.h5 -o model-2.h5`",
         ),
     ),
     "a drive as a run": Mistake(
-        ("identify", "drive.h5", "-o", "out.h5"), 3, "got a drive", "run files beside it: run.h5"
+        ("identify", "drive.h5", "-o", "out.h5"), 3, "got a drive", "give a run, such as run.h5"
     ),
     "a session that is not there": Mistake(
         ("evaluate", "monday.h5"), 3, "monday.h5 (argument ", "playback or session files here: played.h5"
@@ -715,7 +900,7 @@ INSIDE = {
     ),
     "a force limit that nothing keeps": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--limit-force", "0.5"),
-        *(4, "a force of 13.6 N is predicted", "raise --limit-force to 14 or more, or"),
+        *(4, "a force of 13.6 N is predicted", "raise --limit-force to 14 or more; or"),
     ),
     "a heading of a table without headings": Mistake(
         ("import", "bare.csv", "--input", "current_A", "--output", "force_N", "-o", "out.h5"),
@@ -735,7 +920,7 @@ INSIDE = {
     ),
     "a column without a name": Mistake(
         ("import", "wide.csv", "--input", "", "--output", "Kraft", "-o", "out.h5"),
-        *(3, "wide.csv has no column ''; it has time, Spannung", "name one of these\n"),
+        *(3, "wide.csv has no column ''; it has time, Spannung", "name one of these; "),
     ),
     "a unit that nobody knows": Mistake(
         (

@@ -142,6 +142,7 @@ MESSAGES = {
     "no beat of a session": Message("has no whole beat", "pulsetrainer session", "{file}"),
     "not such a row": Message("", "", "{file}, {row}", "expected {expected}", "{got}"),
     "too few answers": Message("answer", "one pulse name on each line", "{file}", "{expected}", "{got}"),
+    "of another device": Message("the run to verify with is of {run}", "the same device", got="of {model}"),
     "a run that was diagnosed": Message("to verify with is one that", "not diagnosed", "{file}"),
     "nothing to extend by": Message("nothing to extend", "{next}", "{file}", got="{verdict}"),
     # --- words -------------------------------------------------------------------------------------------
@@ -184,13 +185,15 @@ MESSAGES = {
     "not our device": Message("not a pulsetrainer device", "pulsetrainer ports", "{port}"),
     "nobody answers": Message("nobody answers", "has power", "{port}"),
     "older device": Message("the device is older", "flash the firmware", "", "{ours}", "{theirs}"),
-    "older program": Message("the program is older", "pip install --upgrade", "", "{ours}", "{theirs}"),
+    "older program": Message("the program is older", "git pull", "", "{ours}", "{theirs}"),
     "beyond the limit": Message(
-        "the current", "--current-max", expected="the limit in force is {limit} A", got="goes up to {got} A"
+        "the current", "--current-max", expected="the limit is {limit} A", got="goes up to {got} A"
     ),
     "limit raised": Message("limit", "lowered", expected="1.5 A", got="9 A"),
-    "tripped while conditioning": Message("force above its limit", "--limit-force", "conditioning", got=" N"),
-    "force-high": Message("force above its limit", "--limit-force", "during the capture", got=KEPT),
+    "tripped while conditioning": Message(
+        "force above its limit", "raise --limit-force", "conditioning", got=" N"
+    ),
+    "force-high": Message("force above its limit of 15 N", "--current-max", "during the capture", got=KEPT),
     "current-rail": Message("current above its hard limit", "plug", "during the capture", got=KEPT),
     "force-frozen": Message("force reading", "cause", "during the capture", got=KEPT),
     "force reading": Message("force", "sensor"),
@@ -214,12 +217,12 @@ MESSAGES = {
         "a coil cannot be measured",
         "--limit-current",
         expected="below {least} A",
-        got="the limit in force is {limit} A",
+        got="the limit is {limit} A",
     ),
     "a quiz without a terminal": Message("answered on the keyboard", "in a file", got="no live view"),
     "another supply": Message("does not fit the voltage", "the supply", "during {during}"),
     "limit below the model's range": Message(
-        "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
+        "the current goes up", "--limit-current", expected="the limit is {limit} A", got="{got} A"
     ),
     "lost on the wire": Message("samples of the", "check the cable", got="were lost on the wire"),
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),
@@ -250,7 +253,7 @@ NOTES = {
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
     "no time that can be read": ("has no time column (its column date", "as time: '1 Nov 2026')"),
-    "nothing gained": ("in 1 pass:", "none was better than the first"),
+    "nothing gained": ("in 1 pass:", "it only measured the drive"),
     "follows half the range": ("% of 0.75 A",),
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),
     "changed": ("(limit 0.", "next", "identify again", "temperature"),

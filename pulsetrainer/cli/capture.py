@@ -9,6 +9,7 @@ from typer import Argument, Context, Option
 
 from pulsetrainer.cli import options
 from pulsetrainer.cli.job import Job
+from pulsetrainer.errors import UsageError
 
 # what must be the same when a capture is resumed
 _SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
@@ -71,7 +72,7 @@ def capture(
     )
     if table is not None:
         job.uses(table)
-    job.notes(_of_options(context, signal, played.name, own=table is None))
+    job.notes(_of_options(context, signal, float(played.value.max()), own=table is None))
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
         from pulsetrainer.files.resume import earlier_of
@@ -117,18 +118,27 @@ def capture(
     job.show(*captured(out, played.name, got, info))
 
 
-def _of_options(context: Context, signal: str, played: str, *, own: bool) -> list[str]:
-    """Return what is told of options that do not suit the signal; ``own``: it is no table."""
+def _of_options(context: Context, signal: str, top_A: float, *, own: bool) -> list[str]:
+    """Return what is told of options that do not suit the signal, or UsageError; ``own``: it is no table."""
     asked, by_us, told = context.params, signal == "identification", []
     for option, name, counts in (
+        ("--levels", "levels", by_us),
         ("--speed", "speed_A_per_s", by_us),
         ("--current-max", "current_max_A", own),
     ):
         source = context.get_parameter_source(name)
-        if not counts and source is not None and source.name == "COMMANDLINE":
-            told.append(f"{option} does not count here: the signal {played} has its own")
+        if counts or source is None or source.name != "COMMANDLINE":
+            continue
+        if name == "current_max_A" and top_A > asked[name]:
+            raise UsageError(
+                f"{signal} goes up to {top_A:.4g} A, more than --current-max {asked[name]:g}",
+                hint="scale the table, or leave --current-max out",
+            )
+        but = " but for the count of cells" * (name == "levels")
+        told.append(f"{option} does not count here{but}: the signal {signal} has its own")
     step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
     if by_us and step_A > level_A:
         far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
+        far += f", {step_A / level_A:.0f} at a time, which a model will miss" * (step_A > 2 * level_A)
         told.append(f"{far}: lower --speed, or raise --rate")
     return told

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 _PIPE_WIDTH = 110
-_COMMAND = re.compile(r"`[^`]*`|\bpulsetrainer [^,;()`]*")  # commands, which a person copies
+# commands, which a person copies
+_COMMAND = re.compile(r"`[^`]*`|(?:\b\w+=\S+ )?\bpulsetrainer(?: (?:[^,;()`]|,(?=\S))*|$)")
 _KEPT = "\0"  # stands for a blank at which no line may end
 
 

@@ -59,6 +59,7 @@ def diagnose(
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
             job.page(html, partial(render_diagnosis, commands=commands), found, header)
+    job.one_device({model: given}, dict(zip(runs, measured, strict=True)))
     job.notes([*found.notes, *_before_correction(runs, measured, model, known)])
     job.screen.result(
         diagnosed(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}

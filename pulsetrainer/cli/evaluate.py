@@ -75,6 +75,7 @@ def evaluate(
             hint="find out what changed; if the new figure is right, change the bound on purpose",
         )
     job.alike(model)
+    job.one_device(dict(zip(model, models, strict=True)), dict(zip(inputs, measured, strict=True)))
     job.notes(evaluation.warnings, "warning: ")
     job.notes(evaluation.notes)
     for path, one in zip(model, models, strict=True):

@@ -33,6 +33,11 @@ def extend(
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
     job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
+    if verify is not None and likely_kind(verify) == "model":
+        raise DataError(
+            f"{verify} (--verify) is a model, expected a run",
+            hint="give one that served neither it nor the diagnosis",
+        )
     from pulsetrainer.files import provenance, store
     from pulsetrainer.report import diagnosis_results, facts
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from typer import Argument, Context, Option
+from typer import Argument, BadParameter, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -66,6 +66,8 @@ def identify(
     Example: pulsetrainer identify run.h5 -o model.h5
     """
     check_once(runs)
+    if bootstrap == 1:
+        raise BadParameter("must be 0, or from 2 to 10000, got 1", param_hint="--bootstrap")
     job = Job(context, inputs=runs, outputs=(out,))
     length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -122,6 +123,13 @@ class Job:
         if model is not None and model.serial not in ("", this):
             self.notes([f"the model is of {model.serial}, but this is {this}, whose force is different"])
         return device
+
+    def one_device(self, models: Mapping[Path, Any], runs: Mapping[Path, Any]) -> None:
+        """Say which runs were recorded on another device than a model is of."""
+        for model, run in itertools.product(models.items(), runs.items()):
+            of, on = (getattr(one[1], "serial", "") for one in (model, run))
+            if of and on and of != on:
+                self.notes([f"{model[0]} is of {of}, but {run[0]} was recorded on {on}: two devices differ"])
 
     def alike(self, files: Sequence[Path]) -> None:
         """Say which files are the same, byte for byte: between them nothing can differ."""

@@ -53,10 +53,11 @@ class Command(TyperCommand):
             setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
             raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
-        for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
+        for given, times in Counter(one for one in options if not one.is_flag).items():
             if times > 1:
+                takes = "file" if given.type.name == "path" else "value"
                 raise UsageError(
-                    f"{name} was given {times} times, and takes one file",
+                    f"{given.opts[-1]} was given {times} times, and takes one {takes}",
                     hint="give it once, or run the command once for each",
                 )
         for one in self.params:
@@ -103,8 +104,9 @@ class Command(TyperCommand):
 
 def _with_file(said: str, given: Any) -> str:
     """Return a message with the file of the model, the drive or the bounds that it begins with."""
-    found = re.match(r"the (model|drive|bounds) (?=takes |is of |name )", said)
+    found = re.match(r"the (model|drive|bounds) (?=takes |is of |name |does not know )", said)
     file = given.get(found[1]) if found else None
+    file = file[0] if isinstance(file, list | tuple) and len(file) == 1 else file
     return f"{found[0]}{file} {said[found.end() :]}" if found and isinstance(file, str | Path) else said
 
 
@@ -112,9 +114,13 @@ def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
     """Name the variable or the file behind an option that is wrong, but was not typed."""
     said = as_options(error.message)
     for one in context.command.params:
-        if re.search(rf"{one.opts[0]}(?![\w-])", said) and (elsewhere := set_by(one, context)):
-            error.message += f" (it comes from {elsewhere[0]})"
-            error.hint = elsewhere[1]
+        about = rf"{one.opts[0]}(?![\w-])" + "|there is no port " * (one.name == "port")
+        if re.search(about, said) and (elsewhere := set_by(one, context)):
+            error.message = said.replace(f"({one.opts[0]})", f"({elsewhere[0]})")
+            if error.message == said:
+                error.message += f" (it comes from {elsewhere[0]})"
+            _, also, other = error.hint.partition("; or ")  # what else can be done still holds
+            error.hint = elsewhere[1] + also + other
 
 
 def _check_names(parameter: Any, typed: Any) -> None:
@@ -164,8 +170,8 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
     error.message = re.sub(r"^(\w+):/(?=\w)", r"\1://", error.message)  # of an address a path keeps one slash
-    if name == "drive" and str(error.path) in library():
-        error.hint = f"{error.path} is a pulse: pulsetrainer invert {error.path} --model model.h5 -o drive.h5"
+    if hint := _for_a_pulse(error.path, name, context):
+        error.hint = hint
         return
     if isinstance(error, AbsentError) and name in _TABLES:
         tables = sorted(path.name for path in folder.glob("*.csv") if is_sound(path))
@@ -194,6 +200,16 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         error.hint = f"there is no {in_words(kinds)} file {where}; {instead}"
     else:
         error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"
+
+
+def _for_a_pulse(path: Path, name: str, context: typer.Context) -> str:
+    """Say how a pulse of the library is given that was meant by an argument; empty where none was."""
+    if name == "waveform" and path.stem in library():
+        return f"{path.stem} is a pulse of the library: write it without {path.suffix}"
+    if str(path) not in library() or (name != "drive" and (name, context.info_name) != ("model", "invert")):
+        return ""
+    model = context.params.get("waveform") or "model.h5"  # of invert: the two were exchanged
+    return f"{path} is a pulse: pulsetrainer invert {path} --model {shlex.quote(model)} -o drive.h5"
 
 
 def _several(path: Path, given: Any, option: str) -> str:

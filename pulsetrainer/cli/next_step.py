@@ -27,7 +27,7 @@ MAKES = {
 # (expected, got): what to do; {file} is the file that was given
 _NEXT = {
     ("model", "run"): "run `pulsetrainer identify {file} -o model.h5`",
-    ("model", "diagnosis"): "run `pulsetrainer extend {file} --model model.h5 -o extended.h5`",
+    ("model", "diagnosis"): "give the model that was diagnosed: `pulsetrainer show {file}` shows its history",
     ("waveform", "model"): "run `pulsetrainer invert normal --model {file} -o drive.h5`",
     ("waveform", "run"): "run `pulsetrainer identify {file} -o model.h5`, "
     "then `pulsetrainer invert normal --model model.h5 -o drive.h5`",
@@ -59,8 +59,8 @@ def next_step(problem: errors.PulsetrainerError) -> str:
         return _after_wrong_kind(problem)
     if isinstance(problem, errors.DamagedFileError):
         known = problem.artefact in MAKES
-        how = f"with `{to_make(problem.artefact, problem.path)}`" if known else "(see pulsetrainer --help)"
-        return f"restore it from a copy, or make it again {how}"
+        how = f"with `{to_make(problem.artefact, problem.path)} --overwrite`" if known else ""
+        return f"restore it from a copy, or make it again {how or '(see pulsetrainer --help)'}"
     if isinstance(problem, errors.NotAnArtefactError) and not problem.foreign:
         if problem.path.suffix.lower() in _TABLES:
             table = shlex.quote(str(problem.path))
@@ -138,10 +138,11 @@ def _after_wrong_kind(problem: errors.WrongKindError) -> str:
     if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
         return f"give each model after a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
-    for kind in problem.expected:
-        if (kind, problem.found) in _NEXT:
-            return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
+    known = next(filter(None, (_NEXT.get((kind, problem.found)) for kind in problem.expected)), "")
+    for name in re.findall(r"-o ([\w.]+)", known):
+        known = known.replace(name, str(free(Path(name))))
+    ways = [known.format(file=shlex.quote(str(problem.path)))] if known else []
     if near := near_names(problem.path, problem.expected):
         files = ", ".join(shlex.quote(str(problem.path.with_name(name))) for name in near)
-        return f"{errors.in_words(problem.expected)} files beside it: {files}"
-    return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
+        ways.insert(0, f"{problem.hint.removesuffix(' instead')}, such as {files}")
+    return "; or ".join(ways) or f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"

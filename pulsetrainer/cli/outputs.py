@@ -12,7 +12,7 @@ import typer
 from pulsetrainer.errors import EndingError, UsageError
 from pulsetrainer.files.output_name import FORMATS, check_artefact_name, is_no_file
 
-_IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
+_IN_PLACE = {"refine"}  # what it writes takes the place of what it was given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
 _FIGURES = ("png", "svg", "pdf")
 

@@ -91,6 +91,7 @@ def session(
     if seed is None:  # in a quiz one that nobody can look up; the file tells it when all is answered
         seed = secrets.randbelow(_MOST_SEED) if quiz else 0
     keys = Keys([Path(name).stem if name.lower().endswith(".csv") else name for name in names])
+    rows = read_changes(changes, keys.names) if changes else []
     chosen, rates = with_quiz(
         Programme(
             keys.names,
@@ -98,7 +99,7 @@ def session(
             amplitude=amplitude,
             beats=beats,
             minutes=minutes,
-            changes=[Change(*row) for row in read_changes(changes, keys.names)] if changes else (),
+            changes=[Change(*row) for row in rows],
         ),
         quiz,
         read_answers(answers, keys.names, quiz)
@@ -108,8 +109,8 @@ def session(
         else keys.answer,
         seed,
     )
-    if amplitude < 1.0:
-        job.notes([f"an amplitude of {amplitude:g} % is hardly felt: 40 % is --amplitude 40"])
+    if (least := min([amplitude, *(row[2] or amplitude for row in rows)])) < 1.0:
+        job.notes([f"an amplitude of {least:g} % is hardly felt: 40 % is written as 40"])
     beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
     if quiz and (unused := [name for name, value in beside.items() if value is not None]):
         job.notes(

@@ -9,41 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pulsetrainer.cli.instead import INSTEAD, NO_COMMAND, NO_FILE, NO_OPTION, SHELLS, SWITCHED
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.input_file import columns_of, spaced
+from pulsetrainer.files.input_file import columns_of, likely_kind, spaced
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
 _EXAMPLES = {
+    "--bootstrap": "--bootstrap 200 is usual",
     "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
-}
-# what is often given as an argument to a command that has none of that kind
-_INSTEAD = {
-    "session": "pulses are separated by commas, a model is an option: --pulses normal,bifid --model model.h5",
-    "check": "-o names the file that --update writes: pulsetrainer check model.h5 --update -o {extra}",
-    "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
-    "ports": "to look at one: pulsetrainer doctor --port {extra}",
-    "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
-    "invert": "one pulse at a time: run it once for each, with an output of its own",
-    "capture": "one signal at a time: run it once for each, with an output of its own",
-    "play": "one drive at a time; a drive already holds what is needed of its model",
-}
-# of them, those that are no file's name
-_NO_FILE = {"ports", "doctor"}
-_SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")  # that typer writes a completion for
-_NO_COMMAND = {
-    "version": "pulsetrainer --version",
-    "help": "pulsetrainer --help, or pulsetrainer identify --help",
-    "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
-}
-_NO_OPTION = {
-    "check --model": "give the model without an option: pulsetrainer check model.h5",
-    "play --model": "leave it out: a drive holds the model that it was made with",
-    "refine --model": "leave it out: a drive holds the model that it was made with",
-    "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
-    "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",
 }
 _LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
@@ -65,7 +41,9 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         hint = f"did you mean {' or '.join(near)}?" if near else _elsewhere(given, context, words) or help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
-        known = _NO_OPTION.get(f"{name} {given}", "").format(behind=behind)
+        known = (NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")).format(behind=behind)
+        if Path(given).is_file():
+            known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -93,7 +71,7 @@ def check_apart(words: Sequence[str]) -> None:
             name = shlex.quote(word.partition("=")[2] or behind)
             raise UsageError(
                 f"there is no option {word}: give the file to write after -o and a space",
-                hint=f"-o {name}" + f"; for a column, two dashes: --output {name}" * ("import" in words),
+                hint=f"for a column, two dashes: --output {name}" if "import" in words else f"-o {name}",
             )
         if word.startswith(_LONG_DASHES) and not Path(word).exists():
             short = word.lstrip("".join(_LONG_DASHES))
@@ -107,7 +85,7 @@ def check_apart(words: Sequence[str]) -> None:
         raise UsageError(
             f"{first} is for the shell it runs in and takes no value, got {second}",
             hint=f"run it in {second}, or let it print: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
-            if second in _SHELLS
+            if second in SHELLS
             else f"write {first} alone",
         )
 
@@ -161,6 +139,9 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
             first, second = map(shlex.quote, (columns[1:3] if len(columns) > 2 else columns))
             said += f"; {given[0]} has {', '.join(columns)}"
             like = f"name two of them, such as --input {first} --output {second}"
+    typed = context.meta.get("pulsetrainer.cli.naming", ()) if context is not None else ()
+    if parameter.name == "model" and (loose := [one for one in typed if likely_kind(Path(one)) == "model"]):
+        like = f"a model is an option: --model {shlex.quote(loose[0])}"
     return UsageError(said, hint=like)
 
 
@@ -193,8 +174,8 @@ def _command_for(word: str, near: str, parsed: Any, words: Sequence[str]) -> str
     """What to type in the place of a word that is no command: a file, a line in quotes, capitals."""
     if word == "help" and (of := [word for word in words if word in parsed.commands]):
         return f"pulsetrainer {of[0]} --help"
-    if word in _NO_COMMAND:
-        return _NO_COMMAND[word]
+    if word in NO_COMMAND:
+        return NO_COMMAND[word]
     first = word.strip().partition(" ")[0]
     if first != word and first in parsed.commands:
         return f"leave out the quotes: pulsetrainer {word}"
@@ -209,11 +190,15 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
     taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
-    instead = _INSTEAD.get(name, "{command} --help")
+    instead = INSTEAD.get(name, "{command} --help")
     if name == "tune" and Path(extra).suffix == ".toml":
         instead = "the file to write is an option: pulsetrainer tune -o {extra}"
-    if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
+    if name in NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
+    if name == "check" and Path(extra).exists():
+        instead = "one model at a time: run it once for each"
+    if extra.lower() in SWITCHED:
+        instead = "leave it out: a switch takes no value; some have an opposite, such as --no-condition"
     beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
     beside += "pulsetrainer compare a.h5 b.h5"
     return UsageError(

@@ -23,7 +23,7 @@ def bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError
     """Return what is wrong with the value of an option; where nobody typed it, with what set it."""
     if elsewhere := set_by(parameter, context):
         return UsageError(f"{elsewhere[0]} (for {named(parameter)}) {must}", hint=elsewhere[1])
-    hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
+    hint = _as_a_number(parameter, must) or _choice(parameter, must, context) or _without(parameter, help_)
     return UsageError(f"{named(parameter)} {must}", hint=hint)
 
 
@@ -89,13 +89,10 @@ def _as_a_number(parameter: Any, must: str) -> str:
     said = _UNIT.search(meaning_of(parameter) + ".")
     if not unit:
         return f"write it with a point and without a unit: {number}"
-    if said and unit == said[1]:
+    if (said and unit == said[1]) or (unit == "bpm" and "beats a minute" in meaning_of(parameter)):
         return f"write the number alone, in {unit}: {number}"
     if said and unit[1:] == said[1] and unit[0] in _FACTORS:
-        other = (
-            "; or, of a model in other units, in its own" if f"{said[1]} or " in meaning_of(parameter) else ""
-        )
-        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}{other}"
+        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
     if said and {unit, said[1]} <= _SECONDS.keys():
         factor = _SECONDS[unit] / _SECONDS[said[1]]
         return f"write it in {said[1]}, without the unit: {float(number) * factor:g}"
@@ -103,16 +100,22 @@ def _as_a_number(parameter: Any, must: str) -> str:
     return f"write it without a unit, and not in {unit}; {named(parameter)} is: {meaning_of(parameter)}"
 
 
-def _choice(parameter: Any, must: str) -> str:
-    """Which of the words that an option takes is meant; else empty."""
+def _choice(parameter: Any, must: str, context: Any) -> str:
+    """Which of the words that an option takes is meant, or which option takes this one; else empty."""
     given, choices = re.match("'(.*?)' is not one of", must), getattr(parameter.type, "choices", ())
-    near = difflib.get_close_matches(given[1].lower(), list(choices), n=1) if given else []
+    word = given[1] if given else ""
+    for other in context.command.params if context is not None else ():
+        if word in getattr(other.type, "choices", ()) and not other.hidden:
+            return f"{word} belongs to another option: {other.opts[0]} {word}"
+    near = difflib.get_close_matches(word.lower(), list(choices), n=1)
     return f"did you mean {near[0]}?" if near else ""
 
 
 def _without(parameter: Any, help_: str) -> str:
     """What happens when an option is left out."""
     default = getattr(parameter, "default", None)
+    if named(parameter) == "--delay":  # 0 takes out nothing
+        return "give how late the output was recorded, in s, such as --delay 0.001"
     if isinstance(default, int | float) and not isinstance(default, bool):
         return f"leave it out for the usual {default:g}, or see {help_}"
     return help_ if getattr(parameter, "required", False) else f"leave it out, or see {help_}"

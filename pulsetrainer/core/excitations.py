@@ -37,12 +37,12 @@ class Signal:
         return turning_points(self.value)[:-1].size
 
 
-def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
-    """Raise ArgumentError where so many ``samples`` so many ``times`` are more than ``most``."""
+def check_size(times: int, samples: float, most: int = MOST_SAMPLES, what: str = "repeats") -> None:
+    """Raise ArgumentError where these ``samples`` so many ``times``, by ``what``, are more than ``most``."""
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
-            f"{str(times)[:20]} times {samples:.6g} samples are more than {most:,}",
-            hint=f"at most {int(most // samples)} of them"
+            f"`{what}` {str(times)[:20]} times {samples:.6g} samples are more than {most:,}",
+            hint=f"give far fewer `{what}`; at most {int(most // samples)} can be recorded"
             if 0 < samples <= most
             else "give fewer, or shorter ones",
         )

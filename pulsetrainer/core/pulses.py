@@ -87,7 +87,7 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
         raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")
     ascending(low, high, what="the range of the pulse")
     positive(rate=rate_Hz)
-    check_size(periods, shape.period_s * rate_Hz)
+    check_size(periods, shape.period_s * rate_Hz, what="periods")
     t = shape.time_s - shape.time_s[0]
     curve = scipy.interpolate.PchipInterpolator(
         np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0])

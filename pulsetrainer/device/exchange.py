@@ -11,7 +11,7 @@ from pulsetrainer.device.frames import Frame, FrameReader, encode
 from pulsetrainer.device.schemes import TIMEOUTS_S, Clock
 from pulsetrainer.device.transport import Transport
 from pulsetrainer.device.wording import FLASH, told
-from pulsetrainer.errors import DeviceError
+from pulsetrainer.errors import UPDATE, DeviceError
 
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
@@ -191,7 +191,7 @@ class Exchange:
         if theirs < ours:
             older, remedy = "device", FLASH
         else:
-            older, remedy = "program", "update this program: pip install --upgrade pulsetrainer"
+            older, remedy = "program", UPDATE
         raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
 
 

@@ -122,10 +122,12 @@ def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str = "") -> No
     hint = hint or less_current(f"`current_max_A` at most {limit_A:g}")
     peak = float(np.max(reference_A, initial=0.0))
     if limit_A < CURRENT_A and peak <= CURRENT_A + codes.CURRENT_UNIT_A / 2:
-        hint = f"raise `limit_current_A` to {peak:.4g} or leave it out, where it was lowered; or {hint}"
+        hint = f"raise `limit_current_A` to {peak:.4g}, or leave it out; or {hint}"
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(
-            f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint
+            f"the current goes up to {peak:.4g} A, but the limit is {limit_A:g} A"
+            + " (`limit_current_A`)" * (limit_A < CURRENT_A),
+            hint=hint,
         )
 
 
@@ -147,9 +149,10 @@ def check_force(
         known = foretold_N is not None and told_A > 0
         lower = f"`current_max_A` at most {told_A:g}" if known else "a lower `current_max_A`"
         enough = math.ceil(most)
-        raised = f"raise `limit_force_N` to {enough} or more, or " if enough <= FORCE_N else ""
+        raised = f"raise `limit_force_N` to {enough} or more; or " if enough <= FORCE_N else ""
         raise DeviceError(
-            f"the device would stop: a force of {most:.3g} N is predicted, and its limit is {limit_N:g} N",
+            f"the device would stop: a force of {most:.3g} N is predicted, and the limit is {limit_N:g} N"
+            + " (`limit_force_N`)" * (limit_N < FORCE_N),
             hint=raised + less_current(lower),
         )
 

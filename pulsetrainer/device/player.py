@@ -287,7 +287,8 @@ class Player:
                 remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (self._feed.size - 1) * self._ticks_per_sample
-        fault = describe_fault(status, self._hello.tick_rate_Hz)
+        limit_N = self._hello.force_trip * codes.FORCE_UNIT_N
+        fault = describe_fault(status, self._hello.tick_rate_Hz, limit_N)
         if not fault or self._stop_remedy:  # with a remedy it is a finding of the host, which came first
             fault = f"{self._stop_reason} (then: {fault})" if fault else self._stop_reason
         not_off = describe_not_off(status)
@@ -302,5 +303,5 @@ class Player:
         if not fault and not to_end:
             fault = refused or "the device ended the play early"
         produced = status.produced if started else 0
-        remedy = NOT_OFF_REMEDY if not_off else self._stop_remedy or remedy_of(status.fault)
+        remedy = NOT_OFF_REMEDY if not_off else self._stop_remedy or remedy_of(status.fault, limit_N)
         return Outcome(produced, to_end, fault, remedy)

@@ -111,10 +111,14 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         )
     if number in {errno.ENOENT, errno.ENODEV, errno.ENXIO} or "FileNotFoundError" in text:
         present = ", ".join(p.device for p in list_ports()) or "none"
+        hint = "check the cable, then `pulsetrainer ports`"
+        if os.name == "posix" and re.fullmatch("COM[0-9]+", port):
+            hint = "COM ports are of Windows; `pulsetrainer ports` lists those of this computer"
+        elif port.startswith("tty"):
+            hint = f"write its path: `port` /dev/{port}"
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint="check the cable, then `pulsetrainer ports`; without a device use `port` bench:, over a "
-            "network socket://host:port",
+            hint=f"{hint}; without a device use `port` bench:, over a network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:
         return DeviceError(f"{port} is not a serial port", hint="`pulsetrainer ports` lists the ports")

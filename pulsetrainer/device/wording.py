@@ -6,7 +6,7 @@ from enum import IntEnum
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.limits import less_current
+from pulsetrainer.device.limits import FORCE_N, less_current
 
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # Faults of which the force sensor is the likely cause.
@@ -14,10 +14,10 @@ FORCE_READING = (
     codes.Fault.NO_FORCE, codes.Fault.FORCE_FROZEN, codes.Fault.FORCE_IMPLAUSIBLE, codes.Fault.FORCE_ZERO,
     codes.Fault.FORCE_RAIL,
 )  # fmt: skip
+_OTHERWISE = "otherwise "
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: "if nothing pressed that hard, check the force sensor; if you lowered "
-    "`limit_force_N`, raise it; otherwise "
+    codes.Fault.OVER_FORCE: f"if nothing pressed that hard, check the force sensor; {_OTHERWISE}"
     + less_current("`current_max_A` well below the current given here"),
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
@@ -56,9 +56,11 @@ def told(kind: type[IntEnum], number: int) -> str:
     return known.text if isinstance(known, codes.Told) else known.name.lower().replace("_", " ")
 
 
-def remedy_of(fault: int) -> str:
+def remedy_of(fault: int, limit_N: float = FORCE_N) -> str:
     """Return what to do about a fault, empty where nothing better than finding its cause is known."""
-    return _REMEDY.get(fault, "")
+    known = _REMEDY.get(fault, "")
+    raised = f"raise `limit_force_N` (the device's own is {FORCE_N:g} N), or "
+    return known.replace(_OTHERWISE, _OTHERWISE + raised) if limit_N < FORCE_N else known
 
 
 def serial_text(serial: bytes) -> str:
@@ -67,12 +69,13 @@ def serial_text(serial: bytes) -> str:
     return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)
 
 
-def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
-    """Return the latched fault with its snapshot, empty if there is none."""
+def describe_fault(status: m.StatusReply, tick_rate_Hz: float, limit_N: float | None = None) -> str:
+    """Return the latched fault with its snapshot, empty if there is none; the force's limit, where known."""
     if not status.fault:
         return ""
+    of = f" of {limit_N:g} N" if limit_N and status.fault == codes.Fault.OVER_FORCE else ""
     return (
-        f"{told(codes.Fault, status.fault)} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
+        f"{told(codes.Fault, status.fault)}{of} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
         f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
         f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
         f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"

@@ -123,7 +123,8 @@ def _read_mat_73(path: Path) -> Columns:
 def _read_wav(path: Path) -> Columns:
     from scipy.io import wavfile  # noqa: PLC0415
 
-    damage = (ValueError, EOFError, struct.error, wavfile.WavFileWarning)
+    # UnboundLocalError: what scipy makes of a file without its format or its samples
+    damage = (ValueError, EOFError, struct.error, wavfile.WavFileWarning, UnboundLocalError)
     with _read_as(path, "a whole .wav file", *damage), warnings.catch_warnings():
         warnings.filterwarnings("ignore", category=wavfile.WavFileWarning)
         warnings.filterwarnings("error", message="Reached EOF", category=wavfile.WavFileWarning)
@@ -190,6 +191,8 @@ def _read_as(path: Path, kind: str, *damage: type[Exception]) -> Iterator[None]:
         yield
     except damage as error:
         said = f": {error}"
+        if isinstance(error, UnboundLocalError):
+            said = ": it lacks its format or its samples"
         if "pickle" in said or "RIFF" in said:  # which is for programmers
             said = ", or holds objects of Python's" if "pickle" in said else ""
         raise DataError(

@@ -109,7 +109,7 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
                 f"{path}, line {number}: the answer is {said!r}, expected one of {', '.join(choices)}",
                 hint="write one of these names on each line",
             )
-    if len(answers) < questions:
+    if len(answers) != questions:
         raise DataError(
             f"{path} has {counted(len(answers), 'answer')} to {questions} questions",
             hint="write one pulse name on each line, as many as questions",

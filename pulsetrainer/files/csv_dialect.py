@@ -140,18 +140,25 @@ def _remark(line: str) -> str:
     return readable(line.strip().lstrip("#%/; "))
 
 
+# how files begin that are no tables, whatever their names
+_FOREIGN = {b"PK\3\4": "an Excel workbook, or a zip file", b"%PDF": "a PDF", b"<!do": "a web page"}
+_FOREIGN |= dict.fromkeys((b"<!DO", b"<htm", b"<HTM"), "a web page")
+
+
 def _encoding(path: Path) -> str:
     with path.open("rb") as stream:
         start = stream.read(4096)
     if start.startswith(_UTF16_MARKS):
         return "utf-16"
+    if found := _FOREIGN.get(start.lstrip()[:4]):
+        raise DataError(f"{path} is {found}, not a table", hint="export the recording as CSV, and give that")
     low, high = start[: 2 * _TABLE : 2], start[1 : 2 * _TABLE : 2]
     if high and not any(high) and all(low):  # without its mark
         return "utf-16-le"
     if b"\0" in start:
         hint = "export the recording as CSV"
-        if likely_kind(path):
-            hint = f"it is an HDF5 file: see `pulsetrainer show {path}`, and give a table here"
+        if kind := likely_kind(path):
+            hint = f"it is a {kind} already, and only tables are read here: see `pulsetrainer show {path}`"
         elif start.startswith(b"\x89HDF"):
             hint = NotAnArtefactError.foreign_hint
         raise DataError(f"{path} is not a text file", hint=hint)

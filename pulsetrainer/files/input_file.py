@@ -196,6 +196,11 @@ def columns_of(table: Path) -> tuple[str, ...]:
 
 def check_resumable(path: Path) -> None:
     """Raise UsageError where of a recording into ``path`` nothing is there, nor beside it, to be resumed."""
+    if (kind := likely_kind(path)) not in ("run", ""):
+        raise UsageError(
+            f"there is nothing to resume: {path} is a {kind}, no interrupted recording",
+            hint="name the recording that broke off, or leave --resume out and name another output",
+        )
     if not path.exists() and not any(path.parent.glob(f"{glob.escape(path.name)}.partial*")):
         raise UsageError(
             f"there is nothing to resume: neither {path} nor {path.name}.partial exists",

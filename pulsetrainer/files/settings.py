@@ -79,7 +79,13 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
     from platformdirs import user_config_path  # noqa: PLC0415 - a file that is named needs no search
 
     places = (Path(FILE_NAME), user_config_path("pulsetrainer", appauthor=False) / FILE_NAME)
-    return next((place for place in places if place.is_file()), None)
+    try:
+        return next((place for place in places if place.is_file()), None)
+    except PermissionError as error:
+        raise UsageError(
+            f"you have no permission to look for settings in {places[1].parent}",
+            hint="check that the variable HOME is your own folder, or name a file: --settings FILE",
+        ) from error
 
 
 def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
@@ -105,6 +111,8 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
             f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
             hint=f"write the number with a point: {comma[1]}.{comma[2]}"
             if comma
+            else "put a name with backslashes into single quotes"
+            if "\\" in line
             else f"write it as TOML, one {what.rstrip('s')} a line, such as: {_TOML_LINES[what]}",
         ) from error
 

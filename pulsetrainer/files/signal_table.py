@@ -53,6 +53,10 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
             f"{path}: the column {table.names[1]} is in {unit}, expected the current to be played in A",
             hint="give the current in A in the second column, such as current_A",
         )
+    if table.rows < 2:
+        raise DataError(
+            f"{path} has {table.rows} row, a signal needs two or more", hint="write a row for each time"
+        )
     below = np.flatnonzero(current < -_NOTHING_A)
     if below.size:
         at = f"{column_words(table.names[1])}, {table.place(int(below[0]))}"

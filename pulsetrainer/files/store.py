@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from pulsetrainer.artefacts import KINDS
-from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
+from pulsetrainer.errors import UPDATE, DamagedFileError, DataError, NotAnArtefactError, WrongKindError
 from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.checksum import append_checksum, is_as_written
 from pulsetrainer.files.decode import Origin, decode, text_of
@@ -184,12 +184,12 @@ def _kind(file: h5py.File, path: Path | str) -> str:
         raise DataError(
             f"{path} has format version {version}, but pulsetrainer {__version__} "
             f"reads up to version {FORMAT_VERSION}",
-            hint="update with `pip install --upgrade pulsetrainer`, or make the file again with this version",
+            hint=f"{UPDATE}, or make the file again with this version",
         )
     if kind not in KINDS:
         raise DataError(
             f"{path}: unknown kind {kind!r}, expected one of {', '.join(KINDS)}",
-            hint="update with `pip install --upgrade pulsetrainer`, or check where the file comes from",
+            hint=f"{UPDATE}, or check where the file comes from",
         )
     return kind
 

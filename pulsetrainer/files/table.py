@@ -34,6 +34,7 @@ _WRITTEN_ROWS = 1 << 14
 _NAMED = 5  # bad rows
 _MOST_BAD = 0.99  # of the rows: with more of them bad, the table is not what it was taken for
 _WITH_UNIT = re.compile(r"[-+]?\d[\d.,]*\s*([^\d\s.,].*)")  # a cell
+_ONE_OF_THESE = "name one of these; where the headings of several files differ, by its number: 1 is the first"
 _AGAIN = "export the recording again"
 
 
@@ -195,7 +196,7 @@ class Table:
         near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
         # a short name is hardly like a heading with a unit
         near = near or [own for own in self.names if _alike(split_unit(name)[0], split_unit(own)[0])]
-        hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else "name one of these"
+        hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else _ONE_OF_THESE
         bare_numbers = self.names == tuple(f"column{k}" for k in range(1, len(self.names) + 1))
         return DataError(
             f"{self.path} has no column {name!r}; "

@@ -56,6 +56,8 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             most = sys.float_info.max
             amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
             hint = f"give {name} a value in that range; it sets: {meaning}"
+            if re.fullmatch(r"-?\d+,\d+", value):
+                hint = f"write it with a point: {name}={value.replace(',', '.')}"
             if re.search(r"[,;]\w+=", value):
                 several = f"bench:?{name}={re.sub('[,;]', '&', value)}"
                 hint = f"put & between parameters, and quotes around them: `port` '{several}'"

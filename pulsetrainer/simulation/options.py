@@ -110,10 +110,10 @@ def _switch(text: str) -> bool:
     return text != "0"
 
 
-def _number_of_device(text: str) -> str:
+def _number_of_device(text: str, name: str = "serial") -> str:
     if not re.fullmatch(r"\d{1,8}", text):
         raise UsageError(
-            f"`port`: the bench parameter serial={text} is not a whole number of up to eight digits",
+            f"`port`: the bench parameter {name}={text} is not a whole number of up to eight digits",
             hint='`port` "bench:?seed=4&serial=3"',
         )
     return text
@@ -148,6 +148,8 @@ def parse_bench(port: str) -> BenchOptions:
         elif name == "serial":
             asked = replace(asked, serial=_number_of_device(value))
         else:
+            if name == "seed" and re.fullmatch(r"\d+\.\d*", value):
+                _number_of_device(value, "seed")
             asked = replace(asked, settings=(*asked.settings, (name, value)))
     return asked
 

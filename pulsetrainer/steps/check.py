@@ -121,7 +121,9 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
-    check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=AGAIN)
+    limit_A = device.info.current_limit_A
+    again = AGAIN.replace(" -o", f" --current-max {limit_A:g} -o", 1)
+    check_peak(np.asarray([low, high]), limit_A, hint=again)
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)

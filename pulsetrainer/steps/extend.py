@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Model, Run
+from pulsetrainer.artefacts.units import same_units, units_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.evaluate import evaluate
@@ -74,8 +75,19 @@ def extend(
             f"the run to verify with is one that {diagnosis_name} was made from: it cannot show what repeats",
             hint="give a run that was not diagnosed",
         )
+    _check_of(model, verify or model, model_name)
     extended = replace(extended, coil=model.coil, captured=model.captured, serial=model.serial)
     return extended if verify is None else _verified(model, extended, verify)
+
+
+def _check_of(model: Model, verify: Run | Model, name: str) -> None:
+    """Refuse a run to verify with that is of another device than the model."""
+    is_of, of = (verify.serial, model.serial) if verify.serial and model.serial else ("", "")
+    if not same_units((verify.input_unit, verify.output_unit), (model.input_unit, model.output_unit)):
+        is_of, of = units_of(verify), units_of(model)
+    if is_of != of:
+        said = f"the run to verify with is of {is_of}, but {name} of {of}"
+        raise DataError(said, hint="give a run of the same device")
 
 
 def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:

@@ -68,8 +68,10 @@ def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:
         return None
     if asked and model.coil is None:
         raise DataError(
-            "the model does not know the coil's resistance at calibration, so no heat can be tracked",
-            hint="capture and identify with firmware that reports the duty (protocol 2.2)",
+            "the model does not know the resistance of its coil, so no heat can be tracked: its run was too "
+            "short, or had pauses, or the firmware is older than protocol 2.2",
+            hint="leave `track_heat` out, or make the model anew from a run of a minute or more: "
+            "pulsetrainer capture identification -o long.h5",
         )
     return model.coil
 

@@ -190,7 +190,8 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
-                hint="import the runs again with the same `input_unit` and `output_unit`",
+                hint="identify runs of different devices one by one; of one device, convert the columns of "
+                "the tables and import them again",
             )
     for what in ("input", "output"):
         largest = float(max(np.fmax.reduce(np.abs(getattr(run, what)), initial=0.0) for run in runs))
@@ -208,7 +209,7 @@ def _with_samples(titles: Sequence[str], runs: Sequence[Run]) -> tuple[list[str]
         (title, part)
         for title, run in zip(titles, runs, strict=True)
         for part in run.parts(SHORTEST_PART)
-        if part.counts.any()
+        if np.isfinite(part.output[part.counts]).any()
     ]
     if not cut:
         raise DataError(

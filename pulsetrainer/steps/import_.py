@@ -129,10 +129,14 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
 
 
 def _still(name: str, report: Report) -> list[str]:
-    low, high = report.input_range
-    if high > low:
-        return []
-    return [f"the input of {name} never moves: it is {with_unit(f'{low:g}', report.input_unit)} throughout"]
+    return [
+        f"the {what} of {name} never moves: it is {with_unit(f'{low:g}', unit)} throughout"
+        for what, (low, high), unit in (
+            ("input", report.input_range, report.input_unit),
+            ("output", report.output_range, report.output_unit),
+        )
+        if not high > low
+    ]
 
 
 def _jumps(run: Run) -> list[str]:
@@ -201,8 +205,8 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
         count = np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9) + 1
     if not 2 <= count <= MOST_SAMPLES:
         raise UsageError(
-            f"resampling to steps of {step:.3g} s would make {count:.6g} samples of {run.input.size}",
-            hint="choose another rate",
+            f"`resample` to steps of {step:.3g} s would make {count:.6g} samples of {run.input.size}",
+            hint="give `resample` even, for the rate that it has",
         )
     even = run.time_s[0] + np.arange(int(count)) * step
     return replace(

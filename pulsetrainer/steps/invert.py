@@ -29,6 +29,7 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 _SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
+_LONG_S = 60.0  # of a period: no pulse of a heart
 _AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
 _SEAM = 0.02  # of the height of a pulse: a smaller jump from its end to its beginning is not told ...
 _SEAM_STEPS = 3.0  # ... nor one of fewer of its own largest steps
@@ -207,8 +208,9 @@ def _check_length(shape: Shape, model: Model, periods: int) -> None:
             f"{last} {periods * shape.period_s:.5g} s; the device stays on "
             f"for at most {ON_TIME_S:g} s at a time",
             hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
-            if most
-            else "a pulse this long usually means that its time is not in seconds",
+            if shape.period_s < _LONG_S
+            else "a pulse this long usually means that its time is not in seconds: write its unit in the "
+            "heading, such as t_ms",
         )
 
 

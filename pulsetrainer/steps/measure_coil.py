@@ -80,7 +80,7 @@ def check_range(range_A: float) -> None:
     """Raise ArgumentError for a current limit in force that leaves no current to measure a coil with."""
     if range_A < _LEAST_A:
         raise ArgumentError(
-            f"a coil cannot be measured below {_LEAST_A:g} A; the limit in force is {range_A:g} A",
+            f"a coil cannot be measured below {_LEAST_A:g} A; the limit is {range_A:g} A (`limit_current_A`)",
             hint=f"raise `limit_current_A` to {_LEAST_A:g} or more",
         )
 

@@ -299,7 +299,7 @@ def condition(device: Device, high_A: float, rate_Hz: float) -> None:
     if loop.size == 0:
         return
     recording = device.play(loop, rate_Hz)
-    raise_if_stopped(recording.fault, recording.remedy, "conditioning")
+    raise_if_stopped(recording.fault, recording.remedy, "conditioning, the stroke that comes first")
 
 
 def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:

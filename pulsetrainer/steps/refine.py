@@ -251,5 +251,7 @@ def _note(tried: list[_Pressed], best: int) -> str:
         else "none was better than the first, which is kept, with a mean error of "
         f"{kept.mean_abs_error_percent:.2f} % of full force"
     )
+    if len(tried) == 1:
+        gained = gained.replace("none was better than the first, which is kept", "it only measured the drive")
     passes = "1 pass" if len(tried) == 1 else f"{len(tried)} passes"
     return f"refined in {passes}: {gained}; the noise alone gives {kept.noise_percent:.2f} %"

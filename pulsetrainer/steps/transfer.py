@@ -105,6 +105,12 @@ def transfer(
 def check_transfer(drive: Waveform, refined: Waveform, names: Sequence[str] = ()) -> Model:
     """Return the model of both drives; DataError, as of ``transfer``, where nothing can be carried over."""
     model, of_refined = check(drive, passes=1), check_refined(refined)
+    if drive.inversion != "continuous":
+        raise DataError(
+            f"{drive.name} is made by {drive.inversion} inversion; only continuous inversion can use what "
+            "was learnt",
+            hint="leave `learnt` out, and refine this drive itself",
+        )
     if model.fingerprint != of_refined.fingerprint:
         of_refined_name, name = named(names, (f"the refined {refined.name}", f"the drive of {drive.name}"))
         raise DataError(
@@ -117,12 +123,6 @@ def check_transfer(drive: Waveform, refined: Waveform, names: Sequence[str] = ()
             f"{refined.name} was refined at {refined.rate_Hz:g} samples a second, but {drive.name} has "
             f"{drive.rate_Hz:g}",
             hint="invert both at one rate",
-        )
-    if drive.inversion != "continuous":
-        raise DataError(
-            f"{drive.name} is made by {drive.inversion} inversion; only continuous inversion can use what "
-            "was learnt",
-            hint="refine this drive itself",
         )
     return model
 
@@ -139,11 +139,14 @@ def check_refined(refined: Waveform) -> Model:
 
 def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: float) -> None:
     """Refuse what was learnt where it is not known to hold for another pulse."""
-    last = refined.passes[refined.kept - 1]
+    last, more = refined.passes[refined.kept - 1], ""
     if last.mean_abs_error_percent > _REFINED * last.noise_percent:
         why = (
             f"refining {refined.name} left {last.mean_abs_error_percent:.2f} % of full force, which is more "
             f"than {_REFINED:g} times the noise of {last.noise_percent:.2f} %"
+        )
+        more = (
+            f"refine it with more `passes` than {len(refined.passes)}, or " if len(refined.passes) < 5 else ""
         )
     elif told < _TOLD:
         why = (
@@ -159,7 +162,7 @@ def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: f
         return
     raise DataError(
         f"{why}; another pulse might become worse",
-        hint="refine the other drive itself, or identify a better model first",
+        hint=f"{more}refine the other drive itself, or identify a better model first",
     )
 
 

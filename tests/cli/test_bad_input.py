@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
+from command_lines import EXCITATION
 from program import PROGRAM, Ran, pulsetrainer, until_recorded
 from wording import refusal
 
@@ -388,3 +389,40 @@ def test_a_drive_longer_than_the_device_plays_is_refused_at_once(ready):
     assert pulsetrainer(ready, *words, "y.h5", "--periods", most).code == 0
     played = pulsetrainer(ready, "play", "y.h5", "-o", "z.h5", "--repeats", 1, "--dry-run")
     assert "stays on" not in played.err
+
+
+def test_a_run_of_another_device_is_told(ready):
+    """Errors of a model on it are those of two devices; both files hold their serial numbers."""
+    words = (*EXCITATION, "-o", "other.h5", "--port", "bench:?seed=3")
+    assert pulsetrainer(ready, *words).code == 0
+    done = pulsetrainer(ready, "evaluate", "other.h5", "--model", "model.h5")
+    assert "model.h5 is of BENCH-0, but other.h5 was recorded on BENCH-3" in done.err
+    assert "was recorded on" not in pulsetrainer(ready, "evaluate", "run.h5", "--model", "model.h5").err
+
+
+def test_what_is_hardly_felt_or_never_moves_is_told(ready):
+    """An amplitude of a table that is a share, and an output that is constant."""
+    (ready / "share.csv").write_text("t_s,amplitude\n1,0.8\n")
+    words = ("session", "--model", "model.h5", "-o", "x.h5", "--beats", "2", "--changes", "share.csv")
+    assert "an amplitude of 0.8 % is hardly felt" in pulsetrainer(ready, *words, "--dry-run").err
+    (ready / "still.csv").write_text("t_s,current_A,force_N\n0,0,1\n1,1,1\n2,0.5,1\n")
+    words = ("import", "still.csv", "--input", "current_A", "--output", "force_N", "-o", "still.h5")
+    assert "the output of still.csv never moves: it is 1 N throughout" in pulsetrainer(ready, *words).err
+
+
+def test_runs_of_two_units_are_no_matter_of_words(ready):
+    """To import them again in the same units was advised, and is wrong of another device."""
+    (ready / "piezo.csv").write_text("t_s,u_V,y_um\n0,0,1\n1,1,2\n2,0.5,1\n")
+    words = ("import", "piezo.csv", "--input", "u_V", "--output", "y_um", "-o", "piezo.h5")
+    assert pulsetrainer(ready, *words).code == 0
+    done = pulsetrainer(ready, "identify", "run.h5", "piezo.h5", "-o", "x.h5")
+    assert done.code == 3
+    assert "try: identify runs of different devices one by one" in done.err
+
+
+def test_what_is_advised_for_a_damaged_run_can_be_done(ready):
+    """The file is there: without --overwrite the advised command would be refused."""
+    with h5py.File(ready / "run.h5", "r+") as file:
+        del file["output"]
+    done = pulsetrainer(ready, "identify", "run.h5", "-o", "x.h5")
+    assert "pulsetrainer capture identification -o run.h5 --overwrite" in done.err

@@ -349,7 +349,8 @@ def test_units_far_from_one(run, tmp_path):
 def test_bad_input_is_exit_3_in_words_and_writes_nothing(run, tmp_path, text, more, said):
     """File, line and column are named, with a next step; no output appears."""
     (tmp_path / "bad.csv").write_text(text)
-    done = run("import", "bad.csv", "--input", "current_A", "--output", "force_N", *more, "-o", "run.h5")
+    output = () if "--output" in more else ("--output", "force_N")
+    done = run("import", "bad.csv", "--input", "current_A", *output, *more, "-o", "run.h5")
     assert done.code == 3, done
     for word in ("bad.csv" if "--output-unit" not in more else "--output-unit", "try:", *said):
         assert word in done.err, done.err

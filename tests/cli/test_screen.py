@@ -115,13 +115,17 @@ def test_a_next_step_is_folded_around_its_commands(monkeypatch):
         "give the run it was identified from: `pulsetrainer show model.h5 --json` tells, or name it",
     )
     say("  try: ", "pulsetrainer identify run.h5 --form direct -o a-long-name.h5, and then go on")
+    say("  try: ", "or pulsetrainer session --model m.h5 --pulses normal,bifid --minutes 2, which is short")
+    say("  try: ", "or let the shell have it printed: _PULSETRAINER_COMPLETE=source_zsh pulsetrainer")
     lines = terminal.getvalue().splitlines()
     kept = (
+        "pulsetrainer session --model m.h5 --pulses normal,bifid --minutes 2",
+        "_PULSETRAINER_COMPLETE=source_zsh pulsetrainer",
         "`pulsetrainer show model.h5 --json`",
         "pulsetrainer identify run.h5 --form direct -o a-long-name.h5",
     )
     assert all(sum(command in line for line in lines) == 1 for command in kept)
-    assert all(len(line) <= 40 or kept[1] in line for line in lines)
+    assert all(len(line) <= 40 or any(command in line for command in kept) for line in lines)
     assert len(lines) > 4
 
 

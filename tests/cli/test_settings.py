@@ -11,6 +11,8 @@ import typer
 
 from pulsetrainer.cli.app import app
 from pulsetrainer.cli.settings import defaults, takers
+from pulsetrainer.errors import UsageError
+from pulsetrainer.files import settings
 from pulsetrainer.files.settings import SETTINGS
 from wording import refusal
 
@@ -85,7 +87,7 @@ def test_a_slip_in_the_file_is_told_with_its_remedy(run, tmp_path, text, then):
             "levels in pulsetrainer.toml (for --levels) must be a whole number, 2 or more, got 1",
         ),
         ('port = ""\n', "port in pulsetrainer.toml (for --port) must name a port, got nothing"),
-        ("[limits]\nforce_N = 500\n", "(it comes from limits.force_N in pulsetrainer.toml)"),
+        ("[limits]\nforce_N = 500\n", "(limits.force_N in pulsetrainer.toml)"),
     ],
 )
 def test_a_wrong_value_of_the_file_is_not_laid_on_an_option(run, tmp_path, text, said):
@@ -160,6 +162,26 @@ def test_an_option_that_does_not_count_is_told(run, signal, noted):
     done = run("capture", signal, "--speed", "3", "--dry-run", "-o", "out.h5")
     assert done.code == 0
     assert ("--speed does not count here" in done.err) == noted
+
+
+def test_levels_of_a_signal_that_has_its_own_are_told(run):
+    """They were taken in silence, and count for the plane alone."""
+    done = run("capture", "diagnostic", "--levels", "12", "--dry-run", "-o", "out.h5")
+    assert done.code == 0
+    assert "--levels does not count here but for the count of cells" in done.err
+
+
+def test_a_home_that_may_not_be_looked_into_is_told(monkeypatch):
+    """As root everything may be, so the system's answer is made up."""
+
+    def refuse(_path):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.is_file", refuse)
+    with pytest.raises(UsageError) as caught:
+        settings.find(None, {})
+    assert "no permission to look for settings in" in caught.value.message
+    assert "HOME" in caught.value.hint
 
 
 @pytest.mark.parametrize(("speed", "noted"), [("31", False), ("32", True)])

@@ -55,8 +55,9 @@ def test_what_refining_could_not_take_out_is_not_carried_over():
     refined = refined_of(plant, "bifid")
     last = replace(refined.passes[refined.kept - 1], noise_percent=0.01)
     passes = (*refined.passes[: refined.kept - 1], last, *refined.passes[refined.kept :])
-    with pytest.raises(DataError):
+    with pytest.raises(DataError) as caught:
         transfer(drive_of(plant), replace(refined, passes=passes), slew=SLEW)
+    assert ("more `passes`" in caught.value.hint) == (len(passes) < 5)
 
 
 def test_what_one_path_says_of_another():

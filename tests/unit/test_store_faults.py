@@ -126,7 +126,7 @@ def test_newer_format_names_both_versions(run_file):
     """A file of a later format: both versions and the remedy."""
     _edit(run_file, lambda file: file.attrs.modify("format_version", 7))
     error = _refused(run_file, kinds.Run, "format version 7", "up to version 1")
-    assert "--upgrade" in error.hint
+    assert "git pull" in error.hint
 
 
 def _instead(name, **how):
