@@ -339,14 +339,6 @@ _WORDS_OF_A_TIRED_HAND = {
     "a single draw": (
         *("identify run.h5 -o out.h5 --bootstrap 1", 2, "--bootstrap must be 0, or from 2", "200 is usual"),
     ),
-    "one number twice": (
-        *(
-            "play drive.h5 -o out.h5 --repeats 5 --repeats 6",
-            2,
-            "--repeats was given 2 times",
-            "give it once",
-        ),
-    ),
     "a rate with its unit": (
         *(
             "session --model model.h5 -o out.h5 --rate 75bpm",

@@ -53,11 +53,10 @@ class Command(TyperCommand):
             setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
             raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
-        for given, times in Counter(one for one in options if not one.is_flag).items():
+        for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
             if times > 1:
-                takes = "file" if given.type.name == "path" else "value"
                 raise UsageError(
-                    f"{given.opts[-1]} was given {times} times, and takes one {takes}",
+                    f"{name} was given {times} times, and takes one file",
                     hint="give it once, or run the command once for each",
                 )
         for one in self.params:

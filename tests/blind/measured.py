@@ -71,7 +71,7 @@ ADDED: dict[str, Callable[..., np.ndarray]] = {
 CHANGED: dict[str, Callable[..., np.ndarray]] = {
     "none": lambda t, y, s, lag, r: y,
     "output-lag": lambda t, y, s, lag, r: late(y, t, lag),
-    "delay": lambda t, y, s, lag, r: np.interp(t - lag, t, y),
+    "delay": lambda t, y, s, lag, r: np.interp(np.abs(t - t[0] - lag) + t[0], t, y),  # as if it came back
     "quantisation": lambda t, y, s, lag, r: np.round(y / s) * s,
     "outliers": lambda t, y, s, lag, r: wild(y, s, r),
     "saturation": lambda t, y, s, lag, r: np.minimum(y, y.max() - r.uniform(2.0, 5.0) * s),

@@ -163,8 +163,8 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     words = ("capture", "identification", "--levels", "12", "--speed", "12", "-o", "run.h5")
     cases = [((), "nothing to resume: neither run.h5 nor run.h5.partial", "leave --resume out")]
 
-    def refused(line, said, hint):
-        done = pulsetrainer(tmp_path, *(line or words), "--resume")
+    def refused(extra, said, hint):
+        done = pulsetrainer(tmp_path, *words, "--resume", *extra)
         assert done.code == 2, done
         assert said in done.err
         assert hint in done.err
@@ -178,7 +178,7 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     assert noted.code == 0, noted
     assert "run.h5.partial holds" in noted.err
     assert "--resume" in noted.err
-    refused(slow, "run.h5 (-o) already exists", "--overwrite")
+    refused(("--speed", "0.75"), "run.h5 (-o) already exists", "--overwrite")
     (tmp_path / "run.h5.partial").unlink()
     refused((), "nothing to resume: run.h5 is complete", "leave --resume out")
     (tmp_path / "run.h5").unlink()
@@ -187,8 +187,8 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
         recorder.append([0.0, 0.001], [0.5, 0.5], [0.5, 0.5], [1.0, 1.0])
         (tmp_path / "run.h5.partial").unlink()
         os.link(tmp_path / "other.h5.partial", tmp_path / "run.h5.partial")
-        refused(slow, "run.h5.partial is being written by another program", "wait")
-    done = pulsetrainer(tmp_path, *slow, "--resume")
+        refused(("--speed", "0.75"), "run.h5.partial is being written by another program", "wait")
+    done = pulsetrainer(tmp_path, *words, "--speed", "0.75", "--resume")
     assert done.code == 3
     assert "not that of this signal" in done.err
 
