@@ -57,14 +57,16 @@ class Sight:
     noise: float  # standard deviation along what is left
     critical: float  # of these, that the test asks for
 
-    def least(self, relevant: float, there: float = 0.0) -> float:
+    def least(self, relevant: float, there: float = 0.0, unsure: float = LIMITS.share_unsure) -> float:
         """Norm of the smallest effect that nine records of ten show, given the relevant fall of squares.
 
-        What looks like the cause already, a gain of ``there``, may be the error of the levels against it.
+        An ``unsure`` of 1 is for effects of which the weights leave as much as of those that are tried; of
+        others half of the records would show so much. What looks like the cause already, a gain of
+        ``there``, may be the error of the levels against it.
         """
         sure = LIMITS.nine_of_ten * self.noise
         tested = self.critical * self.noise + sure
-        relevantly = LIMITS.share_unsure * (sure + float(np.sqrt(sure**2 + relevant)))
+        relevantly = unsure * (sure + float(np.sqrt(sure**2 + relevant)))
         return (max(tested, relevantly) + float(np.sqrt(max(there, 0.0)))) / self.share
 
 

@@ -85,7 +85,8 @@ class State:
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
     sights: Mapping[str, Sight] = field(default_factory=dict)  # of every cause that was screened
-    detectable: Mapping[str, float] = field(default_factory=dict)  # shares of the span that would show
+    detectable: Mapping[str, float] = field(default_factory=dict)  # shares of the span that would show ...
+    expected: Mapping[str, float] = field(default_factory=dict)  # ... in half of the records at least
     extended: Model | None = None  # with those causes
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
@@ -172,11 +173,11 @@ class State:
 
     @property
     def blind(self) -> tuple[str, ...]:
-        """Ids of the common causes of which these records would not have shown what matters."""
-        if not self.question.timed or not self.detectable:
+        """Ids of the common causes of which half of such records would not have shown what matters."""
+        if not self.question.timed or not self.expected:
             return ()
         common = [one.id for one in library().values() if one.common and one.id not in self.current.names]
-        return tuple(one for one in common if not self.detectable.get(one, np.inf) <= LIMITS.matters)
+        return tuple(one for one in common if not self.expected.get(one, np.inf) <= LIMITS.matters)
 
     @property
     def left_rms(self) -> float:

@@ -1327,12 +1327,12 @@ SEEN = dict.fromkeys([cause.id for cause in CAUSE.values() if cause.common], 0.0
 @pytest.mark.parametrize(
     ("more", "expected", "blind"),
     [
-        ({"detectable": SEEN}, "none", ()),
-        ({"detectable": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
-        ({"detectable": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
-        ({"detectable": SEEN | {"step": 9.0}}, "none", ()),
-        ({"detectable": {}}, "none", ()),
-        ({"detectable": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
+        ({"expected": SEEN}, "none", ()),
+        ({"expected": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
+        ({"expected": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
+        ({"expected": SEEN | {"step": 9.0}}, "none", ()),
+        ({"expected": {}}, "none", ()),
+        ({"expected": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
     ],
 )
 def test_nothing_found_is_none_only_where_it_could_have_been_seen(more, expected, blind):
@@ -2239,7 +2239,9 @@ def test_a_better_model_that_misses_something_is_unknown(monkeypatch, error, ver
 def test_a_better_model_of_a_record_that_lacks_rates_proves_nothing(monkeypatch, lacks, verdict):
     """What its finer levels would show does not count as hidden; what no level can show does."""
     blind = {"creep": 0.02}
-    after = _given(monkeypatch, RAMP, findings=(_finding("creep", 20.0),), detectable=blind, lacks=lacks)
+    after = _given(
+        monkeypatch, RAMP, findings=(_finding("creep", 20.0),), detectable=blind, expected=blind, lacks=lacks
+    )
     assert (after.verdict, after.extends) == (verdict, False)
     assert _given(monkeypatch, RAMP, findings=(), detectable={}, lacks=lacks).verdict == "none"
 

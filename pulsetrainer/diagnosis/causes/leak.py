@@ -1,8 +1,9 @@
 """the output leaks away while it is held: z' = y' - k z, as behind a charge amplifier or an AC coupling.
 
 Whatever is held long enough falls back to one value. How much had leaked before a record began is not known,
-so it is a parameter, for each record of its own. The rows of the weights pass the leak: it may take away most
-of the output.
+so it is a parameter, for each record of its own; where the device's zero was, no record shows. If the input
+begins at zero, what is left of the corrected output without an input is that one value. The rows of the
+weights pass the leak: it may take away most of the output.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Va
 _FASTEST = 0.5  # 1/s: the fastest leak that is tried
 _SLOWEST = 0.3  # over a record: of the output that is held, as much is gone in the slowest one
 _RATIO = 3.0  # from one that is tried to the next
+_AT_ZERO = 0.02  # of the input's range: where it begins so near to zero, the empty memory has no input
 
 
 class Leak(Cause):
@@ -36,7 +38,7 @@ class Leak(Cause):
     in_rows = True
     parameters = (
         Quantity("rate", "1/s", 0.0, 2.0, 1e-4, "1 over the time in which a held {output} falls to 37 %"),
-        Quantity("before", "{y}", -1.5, 1.5, 1e-3, "what had leaked when the recording began"),
+        Quantity("before", "{y}", -1.5, 1.5, 1e-3, "what it was off by when the recording began"),
     )
     lasting = False
     corrects = True
@@ -71,4 +73,7 @@ class Leak(Cause):
         left = np.exp(-steps)
         moves = (held[1:] - left * held[:-1]) * steps / (1.0 - left)
         whole = taken.empty + held[0] + np.append(0.0, np.cumsum(moves)) + rate * before * taken.time_s
-        return np.where(np.isfinite(y), whole, np.nan)
+        reach = taken.raw.high - taken.raw.low
+        # without an input nothing is held, and the output is where all that is held falls back to
+        unloaded = abs(taken.raw.low) <= _AT_ZERO * reach
+        return np.where(np.isfinite(y), whole - before * unloaded, np.nan)

@@ -24,6 +24,7 @@ import numpy as np
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
@@ -37,9 +38,12 @@ def stage(state: State) -> State:
     # of one in the model, what it and later ones explain has left the noise since
     known = {name: replace(one, noise=one.noise * quieter) for name, one in state.sights.items()}
     sights = {**known, **seen}
-    detectable = {
-        name: one.least(state.floor.relevant, gains.get(name, 0.0)) / norm
-        for name, one in sights.items()
-        if not library()[name].by_contrast
-    }
-    return replace(state, scores=scores, sights=sights, detectable=detectable)
+    detectable, expected = (
+        {
+            name: one.least(state.floor.relevant, gains.get(name, 0.0), unsure) / norm
+            for name, one in sights.items()
+            if not library()[name].by_contrast
+        }
+        for unsure in (LIMITS.share_unsure, 1.0)
+    )
+    return replace(state, scores=scores, sights=sights, detectable=detectable, expected=expected)
