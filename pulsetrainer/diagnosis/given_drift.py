@@ -53,7 +53,8 @@ def told(state: State, judged: Judged, otherwise: float) -> tuple[Finding, Fitte
 
     ``otherwise`` is what another gain and zero would leave, rms, output unit.
     """
-    if not state.question.timed or state.question.quick:
+    few = state.problem.bins.count <= LIMITS.jackknife
+    if few or not state.question.timed or state.question.quick:
         return None
     slow = {OffsetDrift.id, Step.id}
     found = {one.cause.id for one in state.findings if one.found and not one.in_doubt} - slow
@@ -143,13 +144,11 @@ def step_in(left: FloatArray, unmoved: Sequence[FloatArray], problem: Problem) -
     values, errors = _with_errors(known, left)
     if abs(values[2]) <= LIMITS.student * errors[2]:
         fewer, fewer_errors = _with_errors(known[:, :2], left)
-        values, errors = np.append(fewer, 0.0), np.append(fewer_errors, 0.0)
+        values, errors = np.append(fewer, 0.0), np.append(fewer_errors, errors[2])
     rest = left - known @ values
-    parts = np.array_split(rest, LIMITS.jackknife)
-    slow = max(
-        1.0, np.var([one.mean() for one in parts]) * parts[0].size / np.var(rest)
-    )  # noise is not white
-    alike = np.flatnonzero(fall >= fall[best] - LIMITS.of_a_moment * slow * np.var(rest))
+    parts, own = np.array_split(rest, LIMITS.jackknife), max(float(np.var(rest)), TINY)
+    slow = max(1.0, float(np.var([one.mean() for one in parts])) * parts[0].size / own)  # it is not white
+    alike = np.flatnonzero(fall >= fall[best] - LIMITS.of_a_moment * slow * own)
     half = 0.5 * float(time[alike[-1] + 1] - time[alike[0]]) / LIMITS.student
     return Drifted(
         cause, (float(values[1]), float(values[2]), moment), (float(errors[1]), float(errors[2]), half)
