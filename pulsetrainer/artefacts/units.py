@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError
@@ -40,10 +40,16 @@ _SUFFIXES = """
 _PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
 _BEHIND_A_NAME = frozenset(_SUFFIXES.split())
 _OFFERED = _PREFIXED | _BARE | {unit for unit in _BEHIND_A_NAME if "/" not in unit}
+
+
+def _by_word(units: Mapping[str, str]) -> dict[str, str]:
+    """Return the unit of each word, from the words of each unit."""
+    return {word: unit for unit, words in units.items() for word in words.split()}
+
+
 # as oscilloscopes and people spell them
-_SPELLED = {
-    word: unit
-    for unit, words in {
+_SPELLED = _by_word(
+    {
         "s": "second seconds sec secs sekunde sekunden",
         "ms": "millisecond milliseconds msec millis",
         "us": "microsecond microseconds usec micros",
@@ -57,26 +63,23 @@ _SPELLED = {
         "m": "metre metres meter meters",
         "Pa": "pascal pascals",
         "ohm": "ohm ohms",
-    }.items()
-    for word in words.split()
-}
+    }
+)
 _SPELLED |= {
     f"{word}{long}": prefix + short
     for word, prefix in {"mega": "M", "kilo": "k", "milli": "m", "micro": "u", "nano": "n"}.items()
     for long, short in _SPELLED.items()
     if short in _PREFIXED
 }
-_SHARES = {
-    word: unit
-    for unit, words in {
+_SHARES = _by_word(
+    {
         "µε": "microstrain ustrain µstrain μstrain",
         "vol%": "vol% vol-% vol.% vol.-%",
         "%": "10^-2 10**-2 1e-2 10⁻²",
         "‰": "10^-3 10**-3 1e-3 10⁻³",
         "ppm": "10^-6 10**-6 1e-6 10⁻⁶",
-    }.items()
-    for word in words.split()
-}
+    }
+)
 _SPELLED |= _SHARES
 _SPELLED |= dict.fromkeys("-–—\N{MINUS SIGN}", "1")  # "none"
 # how a quantity is measured, behind its unit: none changes the numbers of a record

@@ -69,9 +69,8 @@ def told(state: State, judged: Judged, otherwise: float) -> tuple[Finding, Fitte
         else:
             others = []
     far = judged.left_by(judged.predicted)
-    if not judged.is_near(said) or root_mean_square(judged.measured - said) >= otherwise:
-        return None
-    if near**2 > LIMITS.half * far**2:
+    worse = root_mean_square(judged.measured - said) >= otherwise or near**2 > LIMITS.half * far**2
+    if worse or not judged.is_near(said):
         return None
     most = float(moved[np.argmax(np.abs(moved))])
     half = LIMITS.student * np.asarray(drift.errors)

@@ -51,8 +51,10 @@ def stage(state: State) -> State:
     shown = {k: PERCENT * v for k, v in state.detectable.items() if v < LIMITS.told_effect}
     if state.verdict in ("none", "inconclusive") and shown:
         usual = [one.id for one in library().values() if one.common or one.drifts]
-        held = tuple(one for one in usual if one not in shown)
-        said.append(Evidence("would have shown, some" if held else "would have shown", "", shown, names=held))
+        hidden = tuple(one for one in usual if one not in shown)
+        said.append(
+            Evidence("would have shown, some" if hidden else "would have shown", "", shown, names=hidden)
+        )
     if state.verdict in ("none", "inconclusive", "unknown") and not state.is_whole(state.current):
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
