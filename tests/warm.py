@@ -125,7 +125,8 @@ def run(path: str, words: list[str], folder: str, env: dict[str, str], streams: 
         connection.connect(path)
         order = json.dumps({"words": words, "folder": folder, "env": env}).encode() + END
         sent = socket.send_fds(connection, [order], list(streams))
-        connection.sendall(order[sent:])
+        if sent < len(order):  # even an empty rest would be sent, to one who may have answered and gone
+            connection.sendall(order[sent:])
         answer = connection.recv(64)
     if not answer:
         raise RuntimeError(f"the process that runs the commands ended during {words}")
