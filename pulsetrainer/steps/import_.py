@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts import BoolArray, FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import BLOCK, GAP, gaps_of, steps_of
 from pulsetrainer.artefacts.units import counted, same_units, units_of, with_seconds, with_unit
-from pulsetrainer.core import input_noise
+from pulsetrainer.core import held, input_noise
 from pulsetrainer.core.coverage import coverage, little_words, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.core.identification import CLEAR, correlation_of
@@ -73,9 +73,11 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     """
     if isinstance(resample, str) and resample != "even":
         raise ArgumentError(f"`resample` must be a rate in Hz or 'even', got {resample!r}", hint="try 'even'")
+    read = [as_read(part) for part in parts]
+    parts = [part for part, _ in read]
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
-    notes = (*notes, *_jumps(run))
+    notes = (*notes, *(said for _, told in read for said in told), *_jumps(run))
     if (said := little_words(report.coverage_percent / 100.0)) and not _still(run.signal, report):
         notes = (*notes, f"{run.signal}: {said}")
     if run.gap_words:
@@ -87,6 +89,37 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
         run, _ = joined([resampled(one, rate_Hz) for part in parts for one in part.parts(_LEAST)])
         run = replace(run, signal=signal)
     return Imported(run, report, (*notes, *_still(run.signal, report), *_notes_on_time(run.signal, report)))
+
+
+def as_read(run: Run) -> tuple[Run, list[str]]:
+    """Return a run without the readings that its logger repeated, and notes that say so.
+
+    Rows without a new input are left out. Rows without a new output stay, as the input has moved on, but are
+    ``masked``.
+    """
+    notes = []
+    new = held.input_readings(run.input, run.output)
+    if new is not None:
+        notes.append(_repeated(run, run.input_quantity, new, "are left out"))
+        run = replace(
+            run,
+            time_s=None if run.time_s is None else run.time_s[new],
+            input=run.input[new],
+            output=run.output[new],
+            reference=None if run.reference is None else run.reference[new],
+        )
+    new = held.output_readings(run.input, run.output)
+    if new is not None:
+        notes.append(_repeated(run, run.output_quantity, new, "count in no fit"))
+        run = replace(run, masked=~new)
+    return run, notes
+
+
+def _repeated(run: Run, quantity: str, new: BoolArray, what: str) -> str:
+    return (
+        f"the {quantity} in {run.signal} is new in one of {1.0 / np.mean(new):.3g} rows only, as its logger "
+        f"repeats each reading: the {np.count_nonzero(~new)} rows between {what}"
+    )
 
 
 def report_of(whole: Run, *, resampled: bool = False) -> Report:
@@ -209,12 +242,14 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
             hint="give `resample` even, for the rate that it has",
         )
     even = run.time_s[0] + np.arange(int(count)) * step
+    measured = run.counts
     return replace(
         run,
         time_s=even,
         input=np.interp(even, run.time_s, run.input),
-        output=np.interp(even, run.time_s, run.output),
+        output=np.interp(even, run.time_s[measured], run.output[measured]),
         reference=None if run.reference is None else np.interp(even, run.time_s, run.reference),
+        masked=None,
     )
 
 
@@ -249,6 +284,9 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
         reference=None
         if first.reference is None
         else np.concatenate([part.reference for part in parts if part.reference is not None]),
+        masked=None
+        if all(part.masked is None for part in parts)
+        else np.concatenate([~part.counts for part in parts]),
         signal=", ".join(part.signal for part in parts),
     )
     return whole, notes
