@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from core_jobs import curves, job, plant, random_reversals
@@ -65,6 +67,14 @@ def test_alternating_ends_at_the_joint_optimum(smoothing):
     alternating = identify([record], PLANE, method="alternating", smoothing=smoothing)
     assert alternating.operator.offset == pytest.approx(joint.operator.offset, abs=1e-8)
     assert np.allclose(alternating.operator.masses, joint.operator.masses, atol=1e-7)
+
+
+def test_the_weights_of_samples_count_by_their_ratios_alone():
+    """In squares of 1e9 the two steps had stopped as soon as they moved by a part of these."""
+    record, _ = noisy(4)
+    heavy = replace(record, sample_weight=np.full(record.input.size, 1e9))
+    plain, other = (identify([one], PLANE, method="alternating") for one in (record, heavy))
+    assert other.operator.offset == pytest.approx(plain.operator.offset, abs=1e-8)
 
 
 def test_sums_of_parts_are_the_sums_of_the_whole():

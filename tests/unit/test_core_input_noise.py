@@ -68,6 +68,7 @@ def test_a_clean_input_is_left_alone(kind):
     cleaned = input_noise.clean(u)
     assert cleaned.input is u
     assert (cleaned.removed, cleaned.kept) == (0, turning_points(u).size - 1)
+    assert cleaned.dead_band < 1e-4  # and no more was looked for
     assert input_noise.estimate(u[:16]) == pytest.approx(0.0, abs=1e-5)
 
 

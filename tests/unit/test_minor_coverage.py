@@ -63,6 +63,22 @@ def test_a_small_loop_tells_its_own_cells_apart():
     assert minor_coverage(PLANE, [u]) == (6 + 6 - 1) / within
 
 
+@pytest.mark.parametrize(("edge", "other", "after"), [(3 / 12, 0.7, 0.7), (8 / 12, 0.4, 0.0)])
+def test_a_turn_is_known_no_better_than_its_noise(edge, other, after):
+    """A turn that noise alone takes into the next band, outwards, marks no cell there: minima and maxima."""
+    first = [0.0, other] if other > edge else [0.0, 1.0, other]
+
+    def told(turn: float, noise: float) -> float:
+        turns = [*first, turn, after]
+        return minor_coverage(
+            PLANE, [np.interp(np.arange(0, len(turns) - 0.99, 0.01), np.arange(len(turns)), turns)], noise
+        )
+
+    near, beyond = edge + np.sign(other - edge) * 0.001, edge - np.sign(other - edge) * 0.001
+    assert told(beyond, 0.002) == told(near, 0.0)
+    assert told(beyond, 0.0) != told(near, 0.0)
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=12))
 def test_the_corners_are_those_of_a_memory_followed_step_by_step(turns):

@@ -51,6 +51,17 @@ def test_a_capture_tells_the_coil_and_how_it_warms():
     assert record_of(cold).rise_per_A2 < 0.1 * COLD.rise_per_A2
 
 
+def test_the_error_of_the_rise_is_what_repeats_scatter():
+    """Six calibrations of one coil: they lie as far from the truth as they say."""
+    off = []
+    for seed in range(6):
+        windows = Windows()
+        windows.add(*telemetry(60.0, seed=seed)[:4])
+        found = record_of(windows)
+        off.append((found.rise_per_A2 - COLD.rise_per_A2) / found.rise_error_per_A2)
+    assert 0.2 < np.sqrt(np.mean(np.square(off))) < 3.0
+
+
 def test_too_short_a_record_tells_nothing():
     """A few seconds are no calibration."""
     windows = Windows()
