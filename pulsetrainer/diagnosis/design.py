@@ -132,23 +132,22 @@ class Bins:
     ) -> scipy.sparse.csr_array | None:
         """Return ``filtered`` as a matrix (count, count), where the filter forgets within a few averages.
 
-        Its answer to an impulse, from rest at the first value; None where that lasts, or a bin is missing.
+        Its answer to an impulse, from rest at the first value and before rest at the last: a fault of the
+        input looks ahead. None where the answer is long, or a bin is missing.
         """
         blocks = []
         for k, (width, step) in enumerate(zip(self.width, dt_s, strict=True)):
-            size = int(np.count_nonzero(self.record == k))
-            impulse = np.zeros((LIMITS.short_filter + 2, 1))
-            impulse[1] = 1.0
-            answer = through(impulse, k, width * step)[1:, 0]
+            size, at = int(np.count_nonzero(self.record == k)), LIMITS.short_filter + 1
+            impulse = np.zeros((2 * at + 1, 1))
+            impulse[at] = 1.0
+            answer = through(impulse, k, width * step)[:, 0]
             heard = np.flatnonzero(np.abs(answer) > LIMITS.rounding * np.abs(answer).max())
-            last = int(heard.max(initial=-1))  # of a long delay nothing is heard yet
-            lasts = last in (-1, LIMITS.short_filter)
-            if lasts or size <= last + 1 or not self._is_even(k, width * step):
+            # of a long delay nothing is heard yet
+            lasts = heard.size == 0 or heard[0] <= 1 or heard[-1] >= 2 * at - 1
+            if lasts or size <= heard[-1] - heard[0] + 1 or not self._is_even(k, width * step):
                 return None
-            kept, lag = answer[: last + 1], np.arange(last + 1)
-            later = scipy.sparse.diags_array(kept, offsets=-lag, shape=(size, size), format="csr")
-            first = (1.0 - np.cumsum(kept), (lag, np.zeros_like(lag)))
-            blocks.append(later + scipy.sparse.csr_array(first, shape=(size, size)))
+            lag = np.arange(min(heard[0], at), max(heard[-1], at) + 1) - at
+            blocks.append(_of_answer(answer[lag + at], lag, size))
         return scipy.sparse.block_diag(blocks, format="csr")
 
     def _is_even(self, k: int, step_s: float) -> bool:
@@ -172,6 +171,18 @@ class Bins:
         for number in self.number:
             total += np.bincount(number[number >= 0], minlength=self.count)
         return total
+
+
+def _of_answer(answer: FloatArray, lag: IntArray, size: int) -> scipy.sparse.csr_array:
+    """Return the filter (size, size) of an answer (m,) at lags (m,); beyond both ends signals are still."""
+    whole = scipy.sparse.diags_array(answer, offsets=-lag, shape=(size, size), format="csr")
+    late, early = np.arange(lag[-1]), np.arange(-lag[0])
+    heard = np.cumsum(answer)
+    # what the answer has from before the first value, and from beyond the last one
+    before = (1.0 - heard[late - lag[0]], (late, np.zeros_like(late)))
+    beyond = (heard[early], (size - early.size + early, np.full_like(early, size - 1)))
+    ends = [scipy.sparse.csr_array(one, shape=(size, size)) for one in (before, beyond)]
+    return whole + ends[0] + ends[1]
 
 
 def _hums_within(record: Record, per_bin: int) -> bool:

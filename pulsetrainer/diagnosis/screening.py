@@ -30,7 +30,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late, RecordedLate, Values
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in
@@ -324,5 +324,5 @@ def in_place(term: Term, score: Score) -> Term:
 
 
 def both_late(score: Score, term: Term) -> bool:
-    """Whether both have one parameter, which says how late they make the output."""
-    return isinstance(score.cause, Late) and isinstance(term.cause, Late)
+    """Whether both have one parameter, which says how late they make the output, or the input."""
+    return any(isinstance(score.cause, one) and isinstance(term.cause, one) for one in (Late, RecordedLate))

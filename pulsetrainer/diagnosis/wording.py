@@ -138,8 +138,8 @@ strength at bound: its strength is at the end of the range that was searched, so
 in step: it keeps step with the loops, and the model without it can follow most of it: it may be what the
     device itself does. Loops at another rate would show which
 leaves more: it takes away less than it leaves, so it may be an error of the model itself
-own error: on a recording of one rate without rests it cannot be distinguished from an error of the model
-    itself: there whatever takes time is a shape of the loop
+own error: on a recording of one rate it cannot be distinguished from an error of the model itself: there
+    whatever takes time is a shape of the loop
 """)
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``advised.Bench.numbers``
 LACKS: Mapping[str, str] = {

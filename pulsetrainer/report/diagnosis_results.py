@@ -127,9 +127,11 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
     masked = int((~made.counts).sum())
     unchanged = is_unchanged(measured, made)
     payload = {"output": out, "corrected": () if unchanged else made.corrected, "masked_samples": masked}
-    change = largest_change(measured, made)
+    of_input, change = (_largest_change(of, measured, made) for of in ("input", "output"))
     rows = {"taken out": "nothing" if unchanged else ", ".join(made.corrected)}
-    if not unchanged and (change or not masked):
+    if of_input:
+        rows["largest change, input"] = with_unit(f"{of_input:.3g}", made.input_unit)
+    if change or not (unchanged or of_input or masked):
         rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit)
     filled = ", filled in between their neighbours" if masked else ""
     rows["samples left out"] = f"{masked} of {made.output.size}{filled}"
@@ -138,10 +140,11 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
 
 def is_unchanged(measured: Run, made: Run) -> bool:
     """Tell whether nothing was taken out of a corrected run."""
-    return not largest_change(measured, made) and bool(made.counts.sum() == measured.counts.sum())
+    moved = any(_largest_change(of, measured, made) for of in ("input", "output"))
+    return not moved and bool(made.counts.sum() == measured.counts.sum())
 
 
-def largest_change(measured: Run, made: Run) -> float:
+def _largest_change(of: str, measured: Run, made: Run) -> float:
     """How far a corrected run is from what was measured, in the samples that count."""
-    changed = abs(made.output - measured.output)[made.counts]  # what is left out was filled in
+    changed = abs(getattr(made, of) - getattr(measured, of))[made.counts]  # what is left out was filled in
     return float(changed[changed >= 0].max(initial=0.0))  # lost samples are not numbers

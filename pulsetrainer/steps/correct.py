@@ -24,9 +24,10 @@ _DELAY = "delay"  # told by the caller: no record tells a recorder's from the de
 def correct(
     run: Run, diagnosis: Diagnosis | None = None, *, delay_s: float = 0.0, names: Sequence[str] = ()
 ) -> Run:
-    """Take out of a run's output those faults of the measurement that a diagnosis of it found.
+    """Take out of a run those faults of the measurement that a diagnosis of it found.
 
-        y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d)
+        y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d), y(t - d)
+        u <- u + tau u'
 
     Samples that cannot be restored (wild, far beyond a rail, beside a step) are interpolated between their
     neighbours and marked in ``masked``: no fit counts them. Coarse steps are replaced by what lies between
@@ -81,17 +82,18 @@ def correct(
     faults = _faults(diagnosis)
     if not faults and not delay_s:
         raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))
-    output = run.output.copy()
+    input_, output = run.input.copy(), run.output.copy()
     masked = ~run.counts
     for where, part in parts:
         if part.fingerprint in known:
-            restored = _restored(part, diagnosis, faults, known[part.fingerprint], delay_s)
+            input_[where], restored = _restored(part, diagnosis, faults, known[part.fingerprint], delay_s)
             lost = np.isnan(restored) & np.isfinite(part.output)
             output[where] = wild.repaired(restored, lost)
             masked[where] |= lost
     ids = [*([_DELAY] if delay_s else []), *(cause.id for cause, _ in faults)]
     taken_out = tuple(dict.fromkeys((*run.corrected, *ids)))
-    return replace(run, output=output, masked=masked if masked.any() else None, corrected=taken_out)
+    whole = masked if masked.any() else None
+    return replace(run, input=input_, output=output, masked=whole, corrected=taken_out)
 
 
 def _check_delay(run: Run, delay_s: float, parts: Sequence[Run], name: str) -> None:
@@ -143,14 +145,14 @@ def _faults(diagnosis: Diagnosis) -> list[tuple[Cause, Values]]:
         if one.cause in diagnosis.correctable
     ]
     # wild and clipped samples must not reach the others; what lies between steps is told from what is left
-    rank = {"record": 0, "output": 1}
-    return sorted(found, key=lambda pair: (2 if pair[0].jagged else rank[pair[0].stage], -pair[0].order))
+    rank = {"record": 0, "output": 1, "input": 2}
+    return sorted(found, key=lambda pair: (3 if pair[0].jagged else rank[pair[0].stage], -pair[0].order))
 
 
 def _restored(
     part: Run, diagnosis: Diagnosis, faults: Sequence[tuple[Cause, Values]], number: int, delay_s: float
-) -> FloatArray:
-    """Return the output (n,) of one part; NaN where nothing can be restored, or was measured."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return input and output (n,) of one part; the output is NaN where nothing can be restored."""
     step_s, begin_s = diagnosis.records[number].step_s, diagnosis.records[number].begin_s
     low, high = float(np.nanmin(part.input)), float(np.nanmax(part.input))
     record, stamps = measured_of("the run", part, diagnosis.polarity, low, high)
@@ -165,11 +167,12 @@ def _restored(
     y = record.output
     if delay_s:
         y = np.interp(begun + delay_s, begun, y, right=np.nan)
+    u = record.input
     for cause, values in faults:
-        y = cause.undo(y, values, taken)
-    restored = np.full(part.output.size, np.nan)
-    restored[good] = diagnosis.polarity * y
-    return np.where(good, restored, part.output)
+        u, y = cause.undo_input(u, values, taken), cause.undo(y, values, taken)
+    input_, output = part.input.copy(), part.output.copy()
+    input_[good], output[good] = u, diagnosis.polarity * y
+    return input_, output
 
 
 def _nothing(diagnosis: Diagnosis, name: str) -> str:

@@ -42,6 +42,8 @@ OF_THE_MEASUREMENT = (
     "clock-skew",
     "leak",
     "frozen",
+    "late-input",
+    "input-lag",
 )
 # two records, or no effect on the device
 NOT_JUDGED = ("condition-change", "current-tracking", "out-of-range", "clipped-input")

@@ -83,6 +83,8 @@ LIBRARY = {
     "outliers": lambda r, s: ({"outliers": s * _log(r, 0.001, 0.01), "outlier-size": _log(r, 2, 6)}, {}),
     # on the measurement itself: the bench has no second clock, no second condition and no other range
     "clock-skew": lambda r, s: ({}, {"skew": s * _sign(r) * _log(r, 3e-5, 2.5e-4)}),
+    "late-input": lambda r, s: ({}, {"delay": s * _log(r, 0.0016, 0.012) + FILTER_S}),
+    "input-lag": lambda r, s: ({}, {"tau": s * _log(r, 0.0018, 0.016) + FILTER_S}),
     "condition-change": lambda r, s: (
         {},
         {"offset": s * _sign(r) * _log(r, 0.1, 0.4), "gain": s * _sign(r) * _log(r, 0.01, 0.04)},
@@ -102,7 +104,7 @@ SETTINGS = ("seed", "noise-seed", "noise")
 # what the library does not hold, put on the measured output
 OUTSIDE = ("gain wander", "hidden load", "bursts")
 FAMILIES = (
-    {"delay", "field-lag", "output-lag", "rate-widening", "viscous"},
+    {"delay", "field-lag", "output-lag", "rate-widening", "viscous", "late-input", "input-lag"},
     {"offset-drift", "step"},
     {"creep", "accommodation", "leak"},
 )
@@ -295,4 +297,14 @@ def _spoilt(case: Case, record: Record) -> Record:
         )
         y = y + 0.25 * burst * np.sin(2 * np.pi * t / 3.1)
     top = case.truth.get("clipped-input", {}).get("size", np.inf)
-    return replace(record, input=np.minimum(record.input, top), output=y)
+    u = np.minimum(record.input, top)
+    if "late-input" in case.causes:
+        u = np.interp(t - (case.truth["late-input"]["delay"] - FILTER_S), t, u)
+    if "input-lag" in case.causes:  # tau z' + z = u, for an input that is straight between samples
+        lag = (case.truth["input-lag"]["tau"] - FILTER_S) / DT_S
+        left = np.exp(-1.0 / lag)
+        b = np.asarray([1.0 - lag * (1.0 - left), lag * (1.0 - left) - left])
+        u = scipy.signal.lfilter(b, [1.0, -left], u, zi=[(1.0 - b[0]) * u[0]])[0]
+    # a recorder that is late is not the driver's own: it knows no reference
+    late = {"late-input", "input-lag"} & set(case.causes)
+    return replace(record, input=u, output=y, reference=None if late else record.reference)

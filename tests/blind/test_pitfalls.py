@@ -182,6 +182,28 @@ def _runs_of_plays(changed, noise=0.001):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["late-input", "input-lag"])
+def test_an_input_that_was_recorded_late_is_no_property_of_the_device(name):
+    """A slow sensor of the input, or one that is read later, was a clock that runs at another rate."""
+    seen, unseen = _runs_of_plays(lambda u, static, t, number: static)
+    late_s, t = 0.03, seen.time_s
+    if name == "late-input":
+        recorded = np.interp(t - late_s, t, seen.input)
+    else:
+        fine = np.linspace(0.0, t[-1], 20 * t.size)
+        recorded = np.interp(t, fine, foreign.lagged(np.interp(fine, t, seen.input), late_s, fine[1]))
+    spoilt = replace(seen, input=recorded)
+    model = pt.identify(spoilt)
+    found = pt.diagnose([spoilt], model)
+    assert ([one.cause for one in found.found], found.correctable) == ([name], (name,))
+    assert found.found[0].parameters[0].value == pytest.approx(late_s, rel=0.05)
+    models = [model, pt.identify(pt.correct(spoilt, found)), pt.identify(seen)]
+    late, corrected, sound = (one.rms_percent for one in pt.evaluate(unseen, models).models)
+    assert 2.0 * sound < late
+    assert corrected < sound + 0.2 * (late - sound)
+
+
+@pytest.mark.slow
 def test_heat_of_a_device_that_is_driven_both_ways_is_no_step():
     """A current of either sign heats: cold is the middle of its range. The extension predicts another run."""
 

@@ -59,6 +59,19 @@ def test_it_says_what_was_corrected_and_masks_the_rest(folder):
     assert fitted.json["masked_samples"] >= 5
 
 
+def test_it_says_how_far_the_input_moved(folder):
+    """`correct` of a slow thermometer said "taken out: nothing", and that the output was left as it was."""
+    run = pt.load(folder / "other.h5")
+    slow = Cause("input-lag", True, 0.005, 90.0, 90.0, (Parameter("tau", 0.1, "s", 0.09, 0.11),))
+    pt.save(_diagnosis(run, "input-lag", (slow,)), folder / "slow.h5")
+    words = ("correct", "other.h5", "--diagnosis", "slow.h5", "-o", "sharp.h5")
+    said = pulsetrainer(folder, *words)
+    assert "taken out              input-lag" in said.out, said
+    assert "largest change, input  0.05 A" in said.out  # 0.1 s at 0.5 A/s
+    assert "left as it was" not in said.err
+    assert pulsetrainer(folder, *words, "--overwrite", "--json").json["corrected"] == ["input-lag"]
+
+
 def test_where_nothing_tells_what_lies_between_steps_that_is_said(folder):
     """Noise as large as they are averages them out."""
     run = pt.load(folder / "other.h5")

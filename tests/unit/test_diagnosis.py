@@ -29,7 +29,7 @@ VOCABULARY = (
     *("delay", "output-lag", "field-lag", "rate-widening", "viscous", "creep", "thermal-drift"),
     *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
     *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
-    *("accommodation", "unlisted", "clipped-input", "leak", "frozen"),
+    *("accommodation", "unlisted", "clipped-input", "leak", "frozen", "late-input", "input-lag"),
 )
 # values that matter, and the values at which a cause does nothing
 STRENGTHS = {
@@ -45,6 +45,8 @@ STRENGTHS = {
     "step": ((0.1, 0.02, 1.0), (0.0, 0.0, 1.0)),
     "clock-skew": ((1e-3,), (0.0,)),
     "leak": ((0.1, 0.0), (0.0, 0.0)),
+    "late-input": ((0.01,), (0.0,)),
+    "input-lag": ((0.01,), (0.0,)),
     "load-dependence": ((0.005,), (0.0,)),
     "accommodation": ((0.1, 10.0), (0.0, 10.0)),
 }
@@ -387,10 +389,11 @@ def test_a_record_of_which_hardly_a_sample_counts_is_passed_over(counts):
     [
         ("delay", (0.0023,), True), ("delay", (0.05,), True), ("delay", (0.9,), False),
         ("output-lag", (0.004,), True), ("output-lag", (0.2,), False), ("resonance", (20.0, 0.2), False),
+        ("late-input", (0.0023,), True), ("late-input", (0.05,), True), ("late-input", (0.9,), False),
     ],
 )  # fmt: skip
 def test_a_filter_that_forgets_soon_is_a_matrix(name, values, short):
-    """It leaves rows sparse, and is the filter itself, from the first average of each record on."""
+    """It leaves rows sparse, and is the filter itself, from the first average of each record to the last."""
     record = _lagging()
     problem = problem_for([record, replace(record, output=record.output[::-1])], 0.0, 1.5)
     bins, steps = problem.bins, [record.step, record.step]

@@ -190,6 +190,9 @@ def test_simple_formulas():
     y = np.sin(T)
     late = _shown("delay", y, 0.03)
     np.testing.assert_allclose(late[3:], y[:-3], atol=1e-12)
+    ahead = _shown("late-input", y, 2.5 * DT)
+    np.testing.assert_allclose(ahead[:-3], 0.5 * (y[2:-1] + y[3:]), atol=1e-12)
+    assert set(ahead[-2:]) == {y[-1]}  # what comes after the end is not known
     np.testing.assert_allclose(
         _shown("viscous", y, 0.5, 0.0, u=3.0 * T) - y, np.where(T > 0, 1.5, 0.0), atol=1e-12
     )
@@ -209,6 +212,41 @@ def test_simple_formulas():
     np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=0), y)
     np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=1), 1.1 * y + 0.4)
     np.testing.assert_allclose(_shown("condition-change", y, 9.0, 9.0, 0.4, 0.1, record=2), 1.1 * y + 0.4)
+
+
+def _triangles(tau: float) -> tuple[np.ndarray, np.ndarray]:
+    """To and fro by 3 a second, with a rest, and what a slow recorder makes of it."""
+    u = 3.0 * np.interp(T, [0.1, 0.73, 1.0, 1.4, 1.7, 2.46], [0.0, 0.63, 0.36, 0.76, 0.76, 0.0])
+    fine = np.arange(T.size * 100) * DT / 100
+    return u, low_pass(np.interp(fine, T, u), tau, DT / 100)[::100]
+
+
+@pytest.mark.parametrize("steps", [1.5, 4.0, 30.0])
+def test_a_slow_recorder_is_undone_and_turns_stay_sharp(steps):
+    """Mean slopes alone round each turn by half of what the input moves in a time step."""
+    u, recorded = _triangles(steps * DT)
+    found = CAUSE["input-lag"].on_input(recorded, recorded, (steps * DT,), _frame(recorded))
+    off = np.abs(found - u)
+    assert off.max() < 0.3 * 3.0 * DT
+    assert np.median(off) < 0.002 * 3.0 * DT
+
+
+def test_the_slope_of_a_noisy_input_is_taken_over_half_of_its_lag():
+    """From one sample to the next noise would be twenty times as large; what is missing is less than half."""
+    u, recorded = _triangles(30 * DT)
+    noisy = recorded + 0.002 * np.random.default_rng(3).standard_normal(T.size)
+    found = CAUSE["input-lag"].on_input(noisy, noisy, (30 * DT,), _frame(noisy))
+    near, naive = np.std(found - u), np.std(noisy + 30 * DT * np.gradient(noisy, DT) - u)
+    assert near < 0.4 * np.std(recorded - u)
+    assert near < 0.5 * naive
+
+
+@pytest.mark.parametrize(("averaged", "told"), [(1, False), (4, True)])
+def test_columns_of_one_table_may_be_read_half_a_sample_apart(averaged, told):
+    """Of the samples as they were recorded, not of their averages."""
+    frame = _frame(averaged=averaged)
+    for name in ("late-input", "input-lag"):
+        assert CAUSE[name].can_be_told((0.2 * DT,), [frame]) is told
 
 
 def test_each_later_record_has_a_condition_of_its_own():

@@ -794,6 +794,8 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
     [
         ("output-lag", [(0.01,), (0.03,)]),
         ("rate-widening", [(0.01,), (0.03,)]),
+        ("late-input", [(0.01,), (0.03,)]),
+        ("input-lag", [(0.01,), (0.03,)]),
         ("viscous", [(0.01 * 8.0 / 0.5, steps * 0.01) for steps in (0.25, 2.0)]),
         ("creep", [(0.03, 0.1), (0.03, 0.408), (0.03, 10.0 / 6.0)]),
         ("thermal-drift", [(0.02 / 16.0, 4.3)]),

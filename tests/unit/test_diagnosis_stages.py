@@ -1153,6 +1153,9 @@ def test_at_one_rate_without_rests_a_memory_of_less_than_a_stroke_is_in_doubt(mo
         ("creep", (residual.HOLDS,), 120.0, 389.0, False),
         ("clock-skew", POOR, 120.0, 389.0, False),
         ("clock-skew", POOR, 140.0, 9000.0, False),
+        ("late-input", POOR, 120.0, 9000.0, True),  # a shape of the loop
+        ("late-input", (residual.RATES,), 120.0, 9000.0, True),
+        ("late-input", (residual.HOLDS,), 120.0, 9000.0, False),
     ],
 )
 def test_at_one_rate_without_rests_a_cause_must_be_larger_than_what_is_left(
@@ -1605,15 +1608,20 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
         assert said.figures == known | shape
 
 
-@pytest.mark.parametrize("doubts", [(), ("it fits, but does not repeat",)])
-def test_a_faster_recording_is_asked_for_only_where_a_fast_cause_is_in_doubt(monkeypatch, doubts):
-    """A delay of two samples that nothing else explains is known well enough."""
-    monkeypatch.setattr(advice, "fastest_of", lambda state, names: 0.02 if "delay" in names else None)
+@pytest.mark.parametrize(
+    ("name", "doubts", "asked"),
+    [("delay", (), False), ("delay", ("it is cut",), True), ("late-input", ("it is cut",), False)],
+)
+def test_a_faster_recording_is_asked_for_only_where_a_fast_cause_is_in_doubt(
+    monkeypatch, name, doubts, asked
+):
+    """A delay of two samples that nothing else explains is known well enough; a late input needs rates."""
+    monkeypatch.setattr(advice, "fastest_of", lambda state, names: 0.02 if names else None)
     monkeypatch.setattr(advice, "as_fast_as", lambda tau, apart: 8.0)
     problem = SimpleNamespace(**{**vars(PROBLEM), "frames": [Frame(0.01, np.zeros(9), 1.0, 1.0, averaged=4)]})
-    state = _state(_fit(1.0), findings=(_finding("delay", 90.0, doubts=doubts),), problem=problem)
+    state = _state(_fit(1.0), findings=(_finding(name, 90.0, doubts=doubts),), problem=problem)
     figures = advice.stage(replace(state, lacks=("length",))).advice.figures
-    assert figures == ({"tau": 0.02, "apart": 0.0025, "faster": 8.0} if doubts else {})
+    assert figures == ({"tau": 0.02, "apart": 0.0025, "faster": 8.0} if asked else {})
 
 
 @pytest.mark.parametrize(("there", "kind"), [(0.00151, "tied"), (0.00149, "tied, no better")])

@@ -110,6 +110,33 @@ def test_what_was_added_is_taken_out(clean, name, polarity):
     assert {"step": 20, "clock-skew": 7}.get(name, 0) >= lost >= {"step": 18, "clock-skew": 4}.get(name, 0)
 
 
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_an_input_that_was_recorded_late_is_taken_back(clean, polarity):
+    """The output of each moment meets its own input again; what came before the first input is not known."""
+    n, at = 8, np.arange(clean.input.size)
+    run = replace(clean, input=clean.input[np.maximum(at - n, 0)], output=polarity * clean.output)
+    done = pt.correct(run, _diagnosis(run, "late-input", polarity=polarity, delay=n / RATE_HZ))
+    np.testing.assert_array_equal(done.input[n:], clean.input[:-n])
+    np.testing.assert_allclose(done.output[n:], polarity * clean.output[:-n], atol=1e-9)
+    assert done.masked.tolist() == (at < n).tolist()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_an_input_that_was_smoothed_is_sharp_again(clean, noise):
+    """The output stays as it is; of a noisy input most of the lag is taken out."""
+    tau = 6.0 / RATE_HZ
+    left = np.exp(-1.0 / 6.0)
+    b = np.asarray([1.0 - 6.0 * (1.0 - left), 6.0 * (1.0 - left) - left])  # straight between samples
+    smooth = lfilter(b, [1.0, -left], clean.input, zi=[(1.0 - b[0]) * clean.input[0]])[0]
+    smooth += noise * np.random.default_rng(5).standard_normal(smooth.size)
+    run = replace(clean, input=smooth)
+    done = pt.correct(run, _diagnosis(run, "input-lag", tau=tau))
+    np.testing.assert_array_equal(done.output, clean.output)
+    assert done.masked is None
+    near, far = (float(np.std(one.input - clean.input)) for one in (done, run))
+    assert near < (0.2 if noise else 0.02) * far
+
+
 def test_a_hum_sought_in_averages_keeps_its_phase(clean):
     """The first average of eight samples lies three and a half samples after the first sample."""
     wide = 8 / RATE_HZ

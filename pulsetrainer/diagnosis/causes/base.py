@@ -32,6 +32,7 @@ _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _WITHIN_STROKE = (0.02, 0.5)  # ranges that the input moves in a time: a level of the plane; a long stroke
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
 _LEVELS = 48  # of a hysteresis that fills in what the readings leave open
+_UNEVEN = 0.5  # of a time step: two columns of one table may be read so far apart
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
@@ -194,6 +195,7 @@ class Cause:
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
+    comes_before: ClassVar[bool] = False  # the output, before the input asks for it
     imitates: ClassVar[bool] = False  # fits almost anything that happens while the device moves
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
     moves_zero: bool = False  # as well as the gain; then wear that looks like it may do both, too
@@ -306,6 +308,10 @@ class Cause:
         firing = self.gate(taken.raw)
         return y if firing is None or firing.mask is None else np.where(firing.mask, np.nan, y)
 
+    def undo_input(self, u: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Input (n,) without a fault of its measurement."""
+        return u
+
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
         return []
@@ -326,6 +332,29 @@ class Late(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try, none shorter than a time step."""
         return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
+
+
+class RecordedLate(Cause):
+    """A fault by which the input is recorded late, with one time: no device answers before it is asked."""
+
+    family = "lag"
+    lasting = False
+    corrects = True
+    comes_before = True
+    excitation = "reversals at three rates or more, spanning ten to one, with stops"
+    source = "Ljung, System Identification, 1999, section 14.1"
+    _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        return sampled(self.parameters, frame)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try, none shorter than a time step."""
+        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
+
+    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether it is late by more than the moments of sampling may be."""
+        return any(values[0] >= _UNEVEN * frame.dt_s / frame.averaged for frame in frames)
 
 
 class OfTheRecord(Cause):

@@ -75,7 +75,9 @@ def stage(state: State) -> State:
     )
     if advice.kind in _ASKS_FOR_MORE and state.question.given is not None and not is_its_own(state):
         advice = replace(advice, figures={**advice.figures, "together": 1.0})
-    fastest = fastest_of(state, [one.cause.id for one in state.findings if one.found and one.in_doubt])
+    doubted = [one.cause for one in state.findings if one.found and one.in_doubt]
+    # an early answer is in doubt for want of other rates, which need no samples that are closer
+    fastest = fastest_of(state, [one.id for one in doubted if not one.comes_before])
     if fastest is not None and "faster" not in advice.figures and state.question.timed:
         apart = sampled_apart(state)
         figures = {"tau": fastest, "apart": apart, "faster": as_fast_as(fastest, apart)}

@@ -27,7 +27,8 @@ What speaks against a cause that was found is written beside it:
   `accommodation`; or, against a step, whatever settles from the beginning of the record fits as well;
 - the record has one rate and no rest, where any cause looks like what a model lacks of the device; and what
   is left is more than noise, or is slow and hardly smaller than what the cause explains; or the cause is a
-  memory that is forgotten within a stroke.
+  memory that is forgotten within a stroke;
+- the record has one rate, and the output seems to come before it is asked: there that is a shape of the loop.
 """
 
 from __future__ import annotations
@@ -188,13 +189,14 @@ def _may_be_own_error(state: State, term: Term, fall: float) -> bool:
 
     There, and in samples without time, every effect that takes time follows the input, and so does the error
     of the model. The fall of the squares must be much larger than what is left, and what is left be noise. A
-    memory that is forgotten within a stroke is in doubt anyway: it is there a shape of the loop.
+    memory that is forgotten within a stroke is in doubt anyway: it is there a shape of the loop. So is an
+    output that comes before the input, also where there are rests.
     """
     cause = term.cause
-    several = residual.TIME not in state.lacks and not {residual.RATES, residual.HOLDS} <= set(state.lacks)
-    if cause.by_contrast or several:
+    missed = {residual.RATES} if cause.comes_before else {residual.RATES, residual.HOLDS}
+    if cause.by_contrast or not (residual.TIME in state.lacks or missed <= set(state.lacks)):
         return False
-    if cause.shapes_strokes(term.values, state.problem.frames):
+    if cause.comes_before or cause.shapes_strokes(term.values, state.problem.frames):
         return True
     if not state.is_whole(state.current):
         return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
