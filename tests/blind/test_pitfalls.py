@@ -182,6 +182,21 @@ def _runs_of_plays(changed, noise=0.001):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("size", [0.01, -0.01])
+def test_a_drift_has_either_direction(size):
+    """Downwards it was a leak that is too slow to be one, and then nothing."""
+    seen, unseen = _runs_of_plays(lambda u, static, t, number: static + size * t / t[-1] * (number == 0))
+    model = pt.identify(seen)
+    found = pt.diagnose([seen], model)
+    assert (found.verdict, found.correctable) == ("offset-drift", ("offset-drift",))
+    calm, _ = _runs_of_plays(lambda u, static, t, number: static)
+    models = [model, pt.identify(pt.correct(seen, found)), pt.identify(calm)]
+    drifting, corrected, sound = (one.shape_rms_percent for one in pt.evaluate(unseen, models).models)
+    assert 1.2 * sound < drifting
+    assert corrected < sound + 0.2 * (drifting - sound)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["late-input", "input-lag"])
 def test_an_input_that_was_recorded_late_is_no_property_of_the_device(name):
     """A slow sensor of the input, or one that is read later, was a clock that runs at another rate."""

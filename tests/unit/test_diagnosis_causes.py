@@ -249,6 +249,13 @@ def test_columns_of_one_table_may_be_read_half_a_sample_apart(averaged, told):
         assert CAUSE[name].can_be_told((0.2 * DT,), [frame]) is told
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.09, False), (0.11, True)])
+def test_a_leak_slower_than_any_that_is_tried_is_a_drift(share, told):
+    """Of what is held a tenth must be gone at the end of the longest record."""
+    frames = [_frame(T), _frame(T[:40])]
+    assert CAUSE["leak"].can_be_told((share / frames[0].length_s, 5.0), frames) is told
+
+
 def test_each_later_record_has_a_condition_of_its_own():
     """One offset and gain for all of them made a step of what the third differed from the second by."""
     cause, frames = CAUSE["condition-change"], [_frame(record=k, records=3) for k in range(3)]

@@ -53,6 +53,10 @@ class Leak(Cause):
         none = (0.0,) * frames[0].records
         return [[(one, *none)] for one in spread(_SLOWEST / frames[0].length_s, _FASTEST, _RATIO)]
 
+    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether what is held falls back: a leak slower than any that is tried is a drift."""
+        return any(values[0] * frame.length_s >= _SLOWEST / _RATIO for frame in frames)
+
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         rate, before = values[0], values[1 + frame.record]
         if rate <= 0.0:
