@@ -13,6 +13,8 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.errors import DataError
 
+_LONG = 0.01  # of the run: no recorder is so late
+
 
 def correct(
     context: Context,
@@ -48,5 +50,9 @@ def correct(
     if results.is_unchanged(measured, corrected):
         why = results.UNSEEN if "quantisation" in corrected.corrected else results.ELSEWHERE
         job.notes([f"{why}, so the output is left as it was"])
+    if measured.time_s is not None and delay > _LONG * (measured.time_s[-1] - measured.time_s[0]):
+        job.notes(
+            [f"{delay:g} s is a long delay for this run; --delay is in seconds: 5 ms are --delay 0.005"]
+        )
     job.notes(["a run that the model is tested on may have the same fault: diagnose and correct it too"])
     job.show(*results.corrected(out, measured, corrected))

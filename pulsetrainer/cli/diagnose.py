@@ -61,6 +61,8 @@ def diagnose(
             job.page(html, partial(render_diagnosis, commands=commands), found, header)
     job.one_device({model: given}, dict(zip(runs, measured, strict=True)))
     job.notes([*found.notes, *_before_correction(runs, measured, model, known)])
+    if found.quick and given.fit is not None and given.fit.warning:  # the full diagnosis tells it itself
+        job.notes([f"{model}: {given.fit.warning}"])
     job.screen.result(
         diagnosed(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )

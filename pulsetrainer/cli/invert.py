@@ -40,7 +40,7 @@ def invert(
         ),
     ] = None,
     periods: Annotated[
-        int, setting("periods", "--periods", "Periods to play; the first is not scored.", min=1)
+        int, setting("periods", "--periods", "Periods to play; of several the first is not scored.", min=1)
     ] = 4,
     slew_A_per_s: Annotated[
         float | None,

@@ -76,7 +76,7 @@ def invert(
     beat
         Number of a beat from 1, or "mean"; None: the whole pulse is one period.
     periods
-        Periods to play; the first one is not scored.
+        Periods to play; of several the first one is not scored.
     slew
         Fastest the drive may move, input unit per second. None: ``DEVICE_SLEW_A_PER_S`` for a model of a run
         that our own device recorded, no limit for any other.

@@ -234,3 +234,10 @@ def test_the_way_on_names_the_diagnosis_that_was_given(folder):
     done = pulsetrainer(folder, "correct", "run.h5", "--diagnosis", "not at fault.h5", "-o", "x.h5", "--json")
     assert done.code == 3
     assert "extend 'not at fault.h5' --model" in done.json["error"]["hint"]
+
+
+@pytest.mark.parametrize(("delay", "long"), [("5", True), ("0.05", False)])
+def test_a_delay_in_milliseconds_is_noticed(folder, delay, long):
+    """Five seconds of a run of twenty were taken out without a word."""
+    done = pulsetrainer(folder, "correct", "other.h5", "--delay", delay, "-o", f"late-{delay}.h5")
+    assert ("--delay is in seconds: 5 ms are --delay 0.005" in " ".join(done.err.split())) is long

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import pulsetrainer as pt
 from program import pulsetrainer
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
@@ -107,6 +109,14 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     done = pulsetrainer(bench, "evaluate", "diagnostic.h5", *models)  # which proves nothing
     assert "extended.h5 was made with diagnostic.h5" in done.err
     assert " model.h5 was made with" not in done.err
+
+
+def test_a_quick_look_repeats_what_the_model_says_of_itself(bench):
+    """A step of twelve newtons was found with a model that describes nothing."""
+    model = pt.load(bench / "model.h5")
+    pt.save(replace(model, fit=replace(model.fit, warning="No static form fits.")), bench / "poor.h5")
+    done = _diagnose(bench, "diagnostic.h5", model="poor.h5", out="poor-quick.h5", more=["--quick"])
+    assert "note: poor.h5: No static form fits." in done.err
 
 
 def test_quick_says_that_it_is_quick(bench):

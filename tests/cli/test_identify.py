@@ -122,5 +122,14 @@ def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path,
     truth = np.tanh(3 * model.fit.input - 1.5)
     spread = np.abs(truth - model.fit.predicted)
     assert np.median(spread) < 3 * first
-    assert run(*base, "--bootstrap", str(draws), "--seed", "5").json["output_uncertainty"] == first
+    again = run(*base, "--bootstrap", str(draws), "--seed", "5")
+    assert again.json["output_uncertainty"] == first
+    assert "says little" not in again.err
     assert run(*base, "--bootstrap", str(draws), "--seed", "6").json["output_uncertainty"] != first
+
+
+def test_a_band_from_few_draws_says_so(run, record):
+    """Two have no quantiles."""
+    record()
+    done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--bootstrap", "2")
+    assert "note: a band from 2 draws says little: --bootstrap 200 is usual" in " ".join(done.err.split())
