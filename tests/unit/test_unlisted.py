@@ -132,6 +132,9 @@ def test_the_curve_of_a_gain_goes_with_the_output():
     part = Part(0, 0.0, 1.0)
     gain = replace(part, gain=True).added(y, z, 3.0)
     np.testing.assert_allclose(gain, part.added(y, z, 3.0) * np.asarray([[0.0], [1.0], [4.0]]))
+    points = np.random.default_rng(1).standard_normal(KNOTS - 1)
+    for one in (part, replace(part, gain=True)):  # the quick way of a curve is that of its points
+        np.testing.assert_allclose(one.shown(y, z, 3.0, points), one.added(y, z, 3.0) @ points, atol=1e-12)
     frame = Frame(DT_S, z, 4.0, 1.0, zero=3.0)
     units = [one.unit for one in Unlisted([replace(part, gain=True), part]).quantities(frame)]
     assert units == ["s", *["1"] * (KNOTS - 1), "s", *["{y}"] * (KNOTS - 1)]

@@ -173,8 +173,15 @@ class Part:
 
     def columns(self, z: FloatArray) -> FloatArray:
         """Curves (n, KNOTS - 1) that are 1 at one knot and 0 at the others; constant beyond the ends."""
-        share = np.clip((z - self.low) / (self.high - self.low), 0.0, 1.0)
-        return np.asarray(_curves()(share))[:, 1:]
+        return np.asarray(_curves()(self._share(z)))[:, 1:]
+
+    def shown(self, y: FloatArray, z: FloatArray, zero: float, points: Sequence[float]) -> FloatArray:
+        """What a curve through ``points`` (KNOTS - 1,) adds to ``y`` (n,): ``added @ points``, quicker."""
+        curve = np.asarray(_through(np.append(0.0, points))(self._share(z)))
+        return curve * (y - zero) if self.gain else curve
+
+    def _share(self, z: FloatArray) -> FloatArray:
+        return np.clip((z - self.low) / (self.high - self.low), 0.0, 1.0)
 
     def added(self, y: FloatArray, z: FloatArray, zero: float) -> FloatArray:
         """What points of the curve add (n, KNOTS - 1) to an output ``y`` (n,); ``zero`` is empty memory's."""
@@ -195,7 +202,11 @@ class Part:
 
 @cache
 def _curves() -> scipy.interpolate.CubicSpline:
-    return scipy.interpolate.CubicSpline(np.linspace(0.0, 1.0, KNOTS), np.eye(KNOTS), bc_type="natural")
+    return _through(np.eye(KNOTS))
+
+
+def _through(values: FloatArray) -> scipy.interpolate.CubicSpline:
+    return scipy.interpolate.CubicSpline(np.linspace(0.0, 1.0, KNOTS), values, bc_type="natural")
 
 
 class Unlisted(Cause):
@@ -264,7 +275,7 @@ class Unlisted(Cause):
         found = y
         for k, part in enumerate(self.parts):
             tau, *curve = values[k * KNOTS : (k + 1) * KNOTS]
-            found = found + part.added(y, part.at(y, tau, frame, k), frame.zero) @ np.asarray(curve)
+            found = found + part.shown(y, part.at(y, tau, frame, k), frame.zero, curve)
         return found
 
 
