@@ -959,3 +959,22 @@ INSIDE = {
         "one name a line",
     ),
 }
+_IMPORT = "import {} --input 2 --output 3 -o out.h5"
+_CAPTURE = "capture {} -o out.h5"
+_INVERT = "invert {} --model model.h5 -o out.h5"
+# tables that a tired hand wrote, or a logger that crashed: command line, text, what is said, what to do
+_UNREADABLE = {
+    "zeros.csv": (
+        *(_IMPORT, f"t,I,F\n0,0,0\n1,1,1\n2,2,13.85105{9999 * chr(0)}"),
+        *("zeros.csv ends in zero bytes, in line 4: the recorder", "cut the file after line 3, or leave"),
+    ),
+    "long.csv": (
+        *(_IMPORT, f"t,I,F\n0,0,0\n1,1,{'x' * 999}\n2,2,2\n"),
+        *(f"has '{'x' * 29}…' in column F, line 3", "correct or remove that line"),
+    ),
+}
+TABLES |= {name: text for name, (_, text, *_) in _UNREADABLE.items()}
+INSIDE |= {
+    name: Mistake(tuple(line.format(name).split()), 3, where, then)
+    for name, (line, _, where, then) in _UNREADABLE.items()
+}

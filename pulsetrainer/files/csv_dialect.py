@@ -32,6 +32,7 @@ _TABLE = 10  # rows of one kind make a table of what stands below a text
 _REMARK_HEADINGS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_ROW_END = re.compile(rb"\d[;,\t]?\r?\n")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
 _ALIKE = 16  # rows with as many decimals: those of the last are no chance
@@ -155,7 +156,8 @@ def _encoding(path: Path) -> str:
     low, high = start[: 2 * _TABLE : 2], start[1 : 2 * _TABLE : 2]
     if high and not any(high) and all(low):  # without its mark
         return "utf-16-le"
-    if b"\0" in start:
+    ends = start.rstrip(b"\0")  # with them: what a crash left
+    if b"\0" in (ends if _ROW_END.search(ends) else start):
         hint = "export the recording as CSV"
         if kind := likely_kind(path):
             hint = f"it is a {kind} already, and only tables are read here: see `pulsetrainer show {path}`"
@@ -359,6 +361,11 @@ def _tail(path: Path, encoding: str) -> str:
         stream.seek(start)
         text = stream.read().decode("utf-16-le" if encoding.startswith("utf-16") else "utf-8", "replace")
     return text[text.find("\n") + 1 if start else 0 :]
+
+
+def ends_in_zeros(path: Path, dialect: Dialect) -> bool:
+    """Whether a file ends in zero bytes, as a crash leaves it; OSError where it cannot be read."""
+    return _tail(path, dialect.encoding).endswith("\0")
 
 
 def ends_in_a_number(path: Path, dialect: Dialect) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_cells import has_thousands, number, readable
+from pulsetrainer.files.csv_cells import has_thousands, number, quoted
 from pulsetrainer.files.csv_dialect import Dialect, column_words
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
@@ -208,4 +208,4 @@ class _Reader:
             )
 
     def _place(self, cell: str, column: int, line: int) -> str:
-        return f"{readable(cell)!r} in {column_words(self.dialect.names[column])}, line {line}"
+        return f"{quoted(cell)} in {column_words(self.dialect.names[column])}, line {line}"

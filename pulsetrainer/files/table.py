@@ -25,8 +25,15 @@ from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
-from pulsetrainer.files.csv_cells import number
-from pulsetrainer.files.csv_dialect import Dialect, cell_at, column_words, detect, ends_in_a_number
+from pulsetrainer.files.csv_cells import number, quoted
+from pulsetrainer.files.csv_dialect import (
+    Dialect,
+    cell_at,
+    column_words,
+    detect,
+    ends_in_a_number,
+    ends_in_zeros,
+)
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
 
@@ -133,7 +140,7 @@ class Table:
         cell = cell_at(self.path, self.line_of(row), self.index(name))
         value = number(cell)
         overload = " (an overload)" if value is not None and np.isfinite(value) else ""
-        return f"{cell!r}{overload}" if cell else "a blank cell"
+        return f"{quoted(cell)}{overload}" if cell else "a blank cell"
 
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
@@ -170,7 +177,7 @@ class Table:
             heading = f"{split_unit(self.names[k])[0]} [{found[1]}]"
             hint = f"remove the unit from the cells, and write it in the heading: {heading!r}"
         said = f"{self.path} has text, not numbers, in {column_words(self.names[k])}"
-        return DataError(f"{said}: {cell!r} in {self.place(0)}", hint=hint)
+        return DataError(f"{said}: {quoted(cell)} in {self.place(0)}", hint=hint)
 
     def _no_column(self, name: str) -> DataError:
         """Return what is wrong with a name that no column has, or that several have."""
@@ -271,6 +278,11 @@ def read_table(
     table = replace(table, columns=columns, shifts=rows.shifts)
     if rows.misfit and not bad_rows:
         bad = table.bad_rows()
+        if bad.size and bad[0] == table.rows - 1 and ends_in_zeros(path, dialect):
+            raise DataError(
+                f"{path} ends in zero bytes, in {table.place(table.rows - 1)}: the recorder stopped there",
+                hint=f"cut the file after line {table.line_of(table.rows - 1) - 1}, or {remedy}",
+            )
         raise DataError(
             f"{rows.misfit} ({_lacking(bad.size, table.rows)}: {table.places(bad)})",
             hint=f"correct or remove {'that line' if bad.size == 1 else 'those lines'}, or "

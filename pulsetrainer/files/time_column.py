@@ -16,6 +16,7 @@ from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.csv_cells import quoted
 from pulsetrainer.files.csv_dialect import cell_at, column_words
 from pulsetrainer.files.table import Table
 from pulsetrainer.files.time_stamps import is_since_1970, stated_rate, unit_of_count
@@ -96,7 +97,7 @@ def _unread(table: Table) -> str:
     if name is None or not table.shifts:
         return ""
     cell = cell_at(table.path, table.line_of(0), table.names.index(name))
-    return f" (its {column_words(name)} could not be read as time: {cell!r})"
+    return f" (its {column_words(name)} could not be read as time: {quoted(cell)})"
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
