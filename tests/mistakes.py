@@ -972,6 +972,30 @@ _UNREADABLE = {
         *(_IMPORT, f"t,I,F\n0,0,0\n1,1,{'x' * 999}\n2,2,2\n"),
         *(f"has '{'x' * 29}…' in column F, line 3", "correct or remove that line"),
     ),
+    "share.csv": (
+        *(_CAPTURE, "t_s,current_A\n0,0%\n1,50%\n2,100%\n"),
+        *("in column current_A: '0%' in line 2", "the heading says A: write the numbers in A, not in %"),
+    ),
+    "minutes.csv": (
+        *(_CAPTURE, "t_s,current_A\n0:00,0\n0:05,1.2\n0:10,0\n"),
+        *("in column t_s: '0:00' in line 2", "with the hour, 0:00:05, or in seconds, 5\n"),
+    ),
+    "dates.csv": (
+        *(_INVERT, "t,value\n2024-05-01,0\n2024-05-02,1\n2024-05-03,0\n"),
+        *("'2024-05-01' in line 2", "a date needs a time of day: 2024-05-01T00:00:00\n"),
+    ),
+    "blank.csv": (_IMPORT, "t,I,F\n0,0,0\n1,,1\n", "has a blank cell in column I, line 3", "remove those"),
+    "overload.csv": (_IMPORT, "t,I,F\n0,0,0\n1,1,9.9e37\n", "(an overload) in column F, line", "remove"),
+    "none.csv": (_IMPORT, "t,I,F\n0,,0\n1,,1\n2,,2\n", "no numbers in column I: all 3 rows", "name another"),
+    "nothing.csv": (_CAPTURE, "", "nothing.csv is empty", "write two columns: t_s,current_A"),
+    "shares.csv": (
+        *(_INVERT, "time;value\n0;0\n0,3;50%\n0,6;100%\n0,8;0%\n"),
+        *("'50%' in column value, line 3: not a number", "write the numbers without %: 50, or"),
+    ),
+    "comma.csv": (
+        *(_CAPTURE, "t_s,current_A\n0,0\n1,1,2\n2,0\n"),
+        *("has 3 columns in line 3", "if 1,2 is a decimal comma, write 1.2, or part the columns by"),
+    ),
 }
 TABLES |= {name: text for name, (_, text, *_) in _UNREADABLE.items()}
 INSIDE |= {

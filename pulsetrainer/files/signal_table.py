@@ -82,7 +82,9 @@ def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, 
     from pulsetrainer.files.table import read_table  # noqa: PLC0415
     from pulsetrainer.files.time_column import seconds  # noqa: PLC0415
 
-    table = read_table(path, lambda head: range(min(2, len(head.names))))
+    if not path.stat().st_size:
+        raise DataError(f"{path} is empty", hint=f"write two columns: {names}")
+    table = read_table(path, lambda head: range(min(2, len(head.names))), remedy="write the table again")
     if len(table.names) < 2:
         raise DataError(f"{path} has {len(table.names)} column; {what}", hint=f"write two columns: {names}")
     return table, seconds(table, table.names[0]), table.check_finite(table.names[1])

@@ -19,7 +19,7 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_cells import quoted
 from pulsetrainer.files.csv_dialect import cell_at, column_words
 from pulsetrainer.files.table import Table
-from pulsetrainer.files.time_stamps import is_since_1970, stated_rate, unit_of_count
+from pulsetrainer.files.time_stamps import how_to_write, is_since_1970, stated_rate, unit_of_count
 
 LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
 ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the first: it has no name
@@ -63,8 +63,9 @@ def time_of(
         place = own_column(table, {table.index(name) for name in wanted})
         if place is None:
             other = "other " * any(is_called_time(table.heading(name)) for name in wanted)
-            lack = f"{table.path} has no {other}time column" + _unread(table)
-            return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
+            unread, remedy = _unread(table)
+            lack = f"{table.path} has no {other}time column{unread}"
+            return _counted(table, lack, remedy, whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
         counts = _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s")
@@ -90,14 +91,15 @@ def time_of(
     return Time(time_s, words, notes)
 
 
-def _unread(table: Table) -> str:
-    """Say that the column of the date is text: how no time is written that can be read."""
+def _unread(table: Table) -> tuple[str, str]:
+    """Say that the column of the date is text, how no time is written that can be read; and what to do."""
     texts = (own for own in table.names if own in table.text_names)
     name = next((own for own in texts if is_called_time(own) or own.lower() in _DATES), None)
     if name is None or not table.shifts:
-        return ""
+        return "", "give `time` or `rate_Hz`"
     cell = cell_at(table.path, table.line_of(0), table.names.index(name))
-    return f" (its {column_words(name)} could not be read as time: {quoted(cell)})"
+    remedy = f"{how_to_write(cell) or 'give another `time`'}, or give `rate_Hz`"
+    return f" (its {column_words(name)} could not be read as time: {quoted(cell)})", remedy
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
@@ -152,6 +154,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     DataError where its unit is none of time, a value is not finite, or it does not increase: the line is
     named.
     """
+    name = table.heading(name)
     unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
         below = not split_unit(table.heading(name))[1] and name in table.units
