@@ -961,6 +961,7 @@ INSIDE = {
 }
 _IMPORT = "import {} --input 2 --output 3 -o out.h5"
 _CAPTURE = "capture {} -o out.h5"
+_CHANGES = "session --model model.h5 -o out.h5 --changes {}"
 _INVERT = "invert {} --model model.h5 -o out.h5"
 # tables that a tired hand wrote, or a logger that crashed: command line, text, what is said, what to do
 _UNREADABLE = {
@@ -987,6 +988,28 @@ _UNREADABLE = {
     "blank.csv": (_IMPORT, "t,I,F\n0,0,0\n1,,1\n", "has a blank cell in column I, line 3", "remove those"),
     "overload.csv": (_IMPORT, "t,I,F\n0,0,0\n1,1,9.9e37\n", "(an overload) in column F, line", "remove"),
     "none.csv": (_IMPORT, "t,I,F\n0,,0\n1,,1\n2,,2\n", "no numbers in column I: all 3 rows", "name another"),
+    "side.csv": (
+        *(_IMPORT, "t_s,0,1,2,3\ncurrent_A,0,1,2,3\nforce_N,0,4,5,6\n"),
+        *("lies on its side: the first cell of each row is a heading (t_s, current_A, force_N)", "transpose"),
+    ),
+    "letter.csv": (
+        _IMPORT,
+        "Dear colleague, please find below my measurements of yesterday.\nThe force was large, about 12 N.\n",
+        *("letter.csv has no rows of numbers", "one column per quantity"),
+    ),
+    "data.json": (
+        *(_IMPORT, '{\n "t_s": [0, 1],\n "current_A": [0, 1]\n}\n', "data.json is JSON, which is not read"),
+        "export it as CSV, TSV, .npz, .npy, .mat or .wav",
+    ),
+    "bad.npy": (_IMPORT, "zK\3\4 nothing", "not a .npy array of numbers that can be read\n", "save it again"),
+    "bad.mat": (
+        _IMPORT,
+        "MATLAB 5.0" * 90,
+        "bad.mat is not a MATLAB file that can be read\n",
+        "save it again",
+    ),
+    "later.csv": (_CHANGES, "t_s,rate\n0,60\n0:05,80\n", "line 3: t_s is '0:05'", "write 5 (seconds)"),
+    "height.csv": (_CHANGES, "t_s,amplitude\n0,80%\n", "amplitude is '80%', expected a", "write 80\n"),
     "nothing.csv": (_CAPTURE, "", "nothing.csv is empty", "write two columns: t_s,current_A"),
     "shares.csv": (
         *(_INVERT, "time;value\n0;0\n0,3;50%\n0,6;100%\n0,8;0%\n"),
