@@ -124,3 +124,13 @@ def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path,
     assert np.median(spread) < 3 * first
     assert run(*base, "--bootstrap", str(draws), "--seed", "5").json["output_uncertainty"] == first
     assert run(*base, "--bootstrap", str(draws), "--seed", "6").json["output_uncertainty"] != first
+
+
+def test_an_output_that_stands_still_is_named_with_its_file_and_unit(run, tmp_path):
+    """Of several runs too, nothing but the file says which sensor was not connected."""
+    rows = "".join(f"{k},{k % 3},1\n" for k in range(9))
+    (tmp_path / "still.csv").write_text(f"t_s,current_A,force_N\n{rows}")
+    columns = ("--input", "current_A", "--output", "force_N")
+    run("import", "still.csv", *columns, "-o", "still.h5")
+    done = run("identify", "still.h5", "-o", "model.h5", "--json")
+    refusal(done, 3, "constant output", file="still.h5")
