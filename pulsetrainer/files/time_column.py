@@ -68,7 +68,7 @@ def time_of(
             return _counted(table, lack, remedy, whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
-        counts = _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s")
+        counts = _just_counts(whole.columns[time]) and unit_of_time(table, time) in ("", "s")
         if counts and not time.endswith(_IN_SECONDS):
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
@@ -104,7 +104,7 @@ def _unread(table: Table) -> tuple[str, str]:
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
     """Return the unit of a column of time, by its heading or its size, and what there is to say of that."""
-    unit, first = _unit_of_time(table, heading), float(table.columns[heading][0])
+    unit, first = unit_of_time(table, heading), float(table.columns[heading][0])
     by_size = "" if unit else unit_of_count(first, heading)
     stamped = is_since_1970(first, unit) and not _as_written(table, heading, 0, "")
     if by_size or stamped:
@@ -155,7 +155,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     named.
     """
     name = table.heading(name)
-    unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
+    unit = unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
         below = not split_unit(table.heading(name))[1] and name in table.units
         raise DataError(
@@ -209,7 +209,7 @@ def _is_winter_time(step: FloatArray, back: NDArray[np.intp]) -> bool:
 def rates_of(table: Table, name: str) -> tuple[float | None, float | None]:
     """Return the rate of a column of time, Hz, by its median step and by its length; None: it is no time."""
     stamps = table.columns[name]
-    unit = _unit_of_time(table, name)
+    unit = unit_of_time(table, name)
     increasing = bool(stamps.size > 1 and np.all(np.isfinite(stamps)) and np.all(np.diff(stamps) >= 0))
     if not unit or unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
         return None, None
@@ -236,7 +236,7 @@ def is_called_time(heading: str) -> bool:
     return split_unit(heading)[0].rpartition(".")[2].lower() in _TIME_NAMES
 
 
-def _unit_of_time(table: Table, name: str) -> str:
+def unit_of_time(table: Table, name: str) -> str:
     """Return the unit of a column of time, empty where the header says none.
 
     ``min`` may be all of it, and ``d`` stands behind a name, where it is a unit of no other column.
