@@ -959,3 +959,69 @@ INSIDE = {
         "one name a line",
     ),
 }
+_IMPORT = "import {} --input 2 --output 3 -o out.h5"
+_CAPTURE = "capture {} -o out.h5"
+_CHANGES = "session --model model.h5 -o out.h5 --changes {}"
+_INVERT = "invert {} --model model.h5 -o out.h5"
+# tables that a tired hand wrote, or a logger that crashed: command line, text, what is said, what to do
+_UNREADABLE = {
+    "zeros.csv": (
+        *(_IMPORT, f"t,I,F\n0,0,0\n1,1,1\n2,2,13.85105{9999 * chr(0)}"),
+        *("zeros.csv ends in zero bytes, in line 4: the recorder", "cut the file after line 3, or leave"),
+    ),
+    "long.csv": (
+        *(_IMPORT, f"t,I,F\n0,0,0\n1,1,{'x' * 999}\n2,2,2\n"),
+        *(f"has '{'x' * 29}…' in column F, line 3", "correct or remove that line"),
+    ),
+    "share.csv": (
+        *(_CAPTURE, "t_s,current_A\n0,0%\n1,50%\n2,100%\n"),
+        *("in column current_A: '0%' in line 2", "the heading says A: write the numbers in A, not in %"),
+    ),
+    "minutes.csv": (
+        *(_CAPTURE, "t_s,current_A\n0:00,0\n0:05,1.2\n0:10,0\n"),
+        *("in column t_s: '0:00' in line 2", "with the hour, 0:00:05, or in seconds, 5\n"),
+    ),
+    "dates.csv": (
+        *(_INVERT, "t,value\n2024-05-01,0\n2024-05-02,1\n2024-05-03,0\n"),
+        *("'2024-05-01' in line 2", "a date needs a time of day: 2024-05-01T00:00:00\n"),
+    ),
+    "blank.csv": (_IMPORT, "t,I,F\n0,0,0\n1,,1\n", "has a blank cell in column I, line 3", "remove those"),
+    "overload.csv": (_IMPORT, "t,I,F\n0,0,0\n1,1,9.9e37\n", "(an overload) in column F, line", "remove"),
+    "none.csv": (_IMPORT, "t,I,F\n0,,0\n1,,1\n2,,2\n", "no numbers in column I: all 3 rows", "name another"),
+    "side.csv": (
+        *(_IMPORT, "t_s,0,1,2,3\ncurrent_A,0,1,2,3\nforce_N,0,4,5,6\n"),
+        *("lies on its side: the first cell of each row is a heading (t_s, current_A, force_N)", "transpose"),
+    ),
+    "letter.csv": (
+        _IMPORT,
+        "Dear colleague, please find below my measurements of yesterday.\nThe force was large, about 12 N.\n",
+        *("letter.csv has no rows of numbers", "one column per quantity"),
+    ),
+    "data.json": (
+        *(_IMPORT, '{\n "t_s": [0, 1],\n "current_A": [0, 1]\n}\n', "data.json is JSON, which is not read"),
+        "export it as CSV, TSV, .npz, .npy, .mat or .wav",
+    ),
+    "bad.npy": (_IMPORT, "zK\3\4 nothing", "not a .npy array of numbers that can be read\n", "save it again"),
+    "bad.mat": (
+        _IMPORT,
+        "MATLAB 5.0" * 90,
+        "bad.mat is not a MATLAB file that can be read\n",
+        "save it again",
+    ),
+    "later.csv": (_CHANGES, "t_s,rate\n0,60\n0:05,80\n", "line 3: t_s is '0:05'", "write 5 (seconds)"),
+    "height.csv": (_CHANGES, "t_s,amplitude\n0,80%\n", "amplitude is '80%', expected a", "write 80\n"),
+    "nothing.csv": (_CAPTURE, "", "nothing.csv is empty", "write two columns: t_s,current_A"),
+    "shares.csv": (
+        *(_INVERT, "time;value\n0;0\n0,3;50%\n0,6;100%\n0,8;0%\n"),
+        *("'50%' in column value, line 3: not a number", "write the numbers without %: 50, or"),
+    ),
+    "comma.csv": (
+        *(_CAPTURE, "t_s,current_A\n0,0\n1,1,2\n2,0\n"),
+        *("has 3 columns in line 3", "if 1,2 is a decimal comma, write 1.2, or part the columns by"),
+    ),
+}
+TABLES |= {name: text for name, (_, text, *_) in _UNREADABLE.items()}
+INSIDE |= {
+    name: Mistake(tuple(line.format(name).split()), 3, where, then)
+    for name, (line, _, where, then) in _UNREADABLE.items()
+}

@@ -138,6 +138,9 @@ MESSAGES = {
     "an empty range": Message("low < high", ""),
     "no such cause": Message("does not know", "update", got="'{named}'"),
     "does not vary": Message("the {constant} does not vary", "capture diagnostic"),
+    "constant output": Message(
+        "the force of {file} does not vary", "check the sensor", got="it is 1 N throughout"
+    ),
     "names it": Message("", "", "{named}"),
     "no beat of a session": Message("has no whole beat", "pulsetrainer session", "{file}"),
     "not such a row": Message("", "", "{file}, {row}", "expected {expected}", "{got}"),
@@ -258,6 +261,9 @@ NOTES = {
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),
     "changed": ("(limit 0.", "next", "identify again", "temperature"),
     "taken as seconds": ("has no known unit", "seconds", "[min]"),
+    "several beats": ("scope holds 4 whole beats", "played as one period", "a table of its own"),
+    "second column": ("of the 3 columns of scope.csv the second is played, p",),
+    "signal without a unit": ("column time, has no unit: taken as s", "lasts 1000 s", "'t_ms'"),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),
     "stretched": ("are stretched to", "N: give --force-min and --force-max"),
 }

@@ -72,6 +72,7 @@ def capture(
     )
     if table is not None:
         job.uses(table)
+    job.notes([played.note] if played.note else [])
     job.notes(_of_options(context, signal, float(played.value.max()), own=table is None))
     course, earlier, at = Course(played, repeats), None, 0
     if resume:

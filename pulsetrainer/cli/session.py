@@ -13,6 +13,9 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pulsetrainer.core.pulses import Shape
     from pulsetrainer.files.provenance import Header
     from pulsetrainer.steps.performance import Now
 
@@ -70,18 +73,17 @@ def session(
 
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
-    from pulsetrainer.files.pulses import pulse_file
+    from pulsetrainer.files.pulses import library, pulse_file, read_pulse
     from pulsetrainer.steps.arguments import check_asked_for
 
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     check_asked_for(answers, quiz, names)
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
-    job.uses(*(path for path, name in zip(tables, names, strict=True) if str(path) == name))
+    job.uses(*(path for path, name in zip(tables, names, strict=True) if name not in library()))
     from pulsetrainer.cli.keys import Keys
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
-    from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.steps.programme import Change, Programme
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, with_quiz
@@ -122,6 +124,7 @@ def session(
         "track_heat": track_heat,
     }
     shapes = [read_pulse(name) for name in names]
+    job.notes(_of_tables(shape for shape, name in zip(shapes, names, strict=True) if name not in library()))
     steered = keys.steer(job.screen, chosen, shapes, by_key=answers is None)
     if dry_run:
         job.check_device()
@@ -159,3 +162,14 @@ def session(
             lead_s=LIVE_LEAD_S if steered.by_key and not quiz else LEAD_S, watch=watch, **asked,
         )  # fmt: skip
     say_pressed(job, out, html, done, questions, device.info)
+
+
+def _of_tables(shapes: Iterable[Shape]) -> list[str]:
+    """Say what a session makes of pulses that are none of the library."""
+    from pulsetrainer.steps.one_beat import say_if_several
+
+    notes: list[str] = []
+    for shape in shapes:
+        notes += [shape.note] if shape.note else []
+        say_if_several(shape, notes, "write a single beat into a table of its own")
+    return notes

@@ -25,6 +25,7 @@ class Signal:
     value: FloatArray  # (n,) input unit
     rate_Hz: float
     name: str
+    note: str = ""  # what a person should know of where it was read from
 
     @property
     def time_s(self) -> FloatArray:

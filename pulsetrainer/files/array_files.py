@@ -190,11 +190,10 @@ def _read_as(path: Path, kind: str, *damage: type[Exception]) -> Iterator[None]:
     try:
         yield
     except damage as error:
-        said = f": {error}"
-        if isinstance(error, UnboundLocalError):
-            said = ": it lacks its format or its samples"
-        if "pickle" in said or "RIFF" in said:  # which is for programmers
-            said = ", or holds objects of Python's" if "pickle" in said else ""
+        # what the library says is for programmers
+        said = ": it lacks its format or its samples" if isinstance(error, UnboundLocalError) else ""
+        if "pickle" in str(error):
+            said = ", or holds objects of Python's"
         raise DataError(
             f"{path} is not {kind} that can be read{said}", hint="save it again, or export it as CSV"
         ) from error

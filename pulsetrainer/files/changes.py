@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.csv_cells import quoted
 
 _COLUMNS = ("t_s", "rate", "amplitude", "pulse")
 Row = tuple[float, float | None, float | None, str | None]  # time (s), rate, amplitude (%) and pulse
@@ -56,6 +58,14 @@ def _columns(names: Sequence[str] | None) -> str:
     return f"the column{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
+def _as_number(text: str) -> str:
+    """Say how a number is to be written: without its sign or unit, a time in seconds."""
+    if found := re.fullmatch(r"(\d+):(\d\d)", text):
+        return f"write {60 * int(found[1]) + int(found[2])} (seconds)"
+    found = re.fullmatch(r"(\d[\d.]*)\s*[^\d\s]+", text)
+    return f"write {found[1]}" if found else "correct it"
+
+
 def _change(path: Path, line: int, row: dict[str, str | None], pulses: Sequence[str]) -> Row:
     said = {name: (value or "").strip() for name, value in row.items() if name in _COLUMNS}
     numbers: list[float | None] = []
@@ -66,7 +76,8 @@ def _change(path: Path, line: int, row: dict[str, str | None], pulses: Sequence[
         except ValueError:
             numbers.append(math.nan)
         if numbers[-1] is not None and not math.isfinite(numbers[-1]):
-            raise DataError(f"{path}, line {line}: {name} is {text!r}, expected a number", hint="correct it")
+            wrong = f"{path}, line {line}: {name} is {quoted(text)}, expected a number"
+            raise DataError(wrong, hint=_as_number(text))
     time_s, rate, amplitude = numbers
     if time_s is None or time_s < 0:
         raise DataError(f"{path}, line {line}: t_s must not be negative or empty", hint="give a time in s")

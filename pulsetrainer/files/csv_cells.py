@@ -16,6 +16,7 @@ _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' \u00a0\u202f])\d{3}(\1\d{3})*([.,]\d+)?")
 MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+_SHOWN = 30  # characters of a cell in a message
 _MINUS = "\N{MINUS SIGN}"
 
 
@@ -65,6 +66,11 @@ def is_text(cell: str) -> bool:
 def is_number(cell: str) -> bool:
     """Whether a number stands in a cell: not text, not nothing."""
     return cell.lower() not in MISSING and not is_text(cell)
+
+
+def quoted(cell: str) -> str:
+    """Return a cell as a message shows it: in quotes, and not all of a long one."""
+    return repr(readable(cell) if len(cell) <= _SHOWN else f"{readable(cell)[: _SHOWN - 1]}…")
 
 
 def readable(line: str) -> str:

@@ -32,6 +32,9 @@ _TABLE = 10  # rows of one kind make a table of what stands below a text
 _REMARK_HEADINGS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_JSON = re.compile(rb'\s*(\{\s*"|\[\s*[\[{])')
+_READ_KINDS = "CSV, TSV, .npz, .npy, .mat or .wav"
+_ROW_END = re.compile(rb"\d[;,\t]?\r?\n")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
 _ALIKE = 16  # rows with as many decimals: those of the last are no chance
@@ -152,10 +155,13 @@ def _encoding(path: Path) -> str:
         return "utf-16"
     if found := _FOREIGN.get(start.lstrip()[:4]):
         raise DataError(f"{path} is {found}, not a table", hint="export the recording as CSV, and give that")
+    if path.suffix.lower() == ".json" or _JSON.match(start):
+        raise DataError(f"{path} is JSON, which is not read", hint=f"export it as {_READ_KINDS}")
     low, high = start[: 2 * _TABLE : 2], start[1 : 2 * _TABLE : 2]
     if high and not any(high) and all(low):  # without its mark
         return "utf-16-le"
-    if b"\0" in start:
+    ends = start.rstrip(b"\0")  # with them: what a crash left
+    if b"\0" in (ends if _ROW_END.search(ends) else start):
         hint = "export the recording as CSV"
         if kind := likely_kind(path):
             hint = f"it is a {kind} already, and only tables are read here: see `pulsetrainer show {path}`"
@@ -260,6 +266,22 @@ def _is_row(row: list[str], last: list[str]) -> bool:
     return told or not any(here and is_number(below) for here, below in zip(text, last, strict=True))
 
 
+def _headings_of_rows(rows: list[list[str]]) -> list[str]:
+    """Return the headings of a table that lies on its side: few rows of numbers, a heading before each."""
+    heads = [row[0] for row in rows]
+    few = 1 < len(rows) < len(rows[0]) and len(set(heads)) == len(rows)
+    named = few and any(split_unit(head)[1] for head in heads)
+    return heads if named and all(_begins_with_text(row, rows[0]) for row in rows) else []
+
+
+def _no_numbers(path: Path, line: _Row) -> DataError:
+    return DataError(
+        f"{path} has no rows of numbers: all of its lines are words or headings, such as line "
+        f"{line.number}: {line.text[:60]!r}",
+        hint="export what is below the headings too: one column per quantity, one row per sample",
+    )
+
+
 def _is_heading(row: list[str]) -> bool:
     """Whether a line has text and no number; a remark has no unit."""
     return any(map(is_text, row)) and not any(map(is_number, row))
@@ -280,6 +302,11 @@ def _with_header(
     rate = _cut_settings(rows)
     text = [[is_text(cell) for cell in row] for row in rows]
     heads = _heading_lines(text, rows)
+    if sideways := _headings_of_rows(rows):
+        raise DataError(
+            f"{path} lies on its side: the first cell of each row is a heading ({', '.join(sideways)})",
+            hint="transpose it: one column per quantity, one row per sample",
+        )
     if heads == len(rows):
         raise DataError(f"{path} has no rows below its header", hint="export the recording again")
     begin, body = lines[heads], rows[heads:]
@@ -288,6 +315,8 @@ def _with_header(
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
     names, first = _without_end(names, first)
     unremarked = len(names) == len(first) + 1 and names[-1].lower() in _REMARK_HEADINGS
+    if len(names) != len(first) and not any(2 * sum(map(is_number, row)) >= len(row) for row in body):
+        raise _no_numbers(path, begin)
     if len(names) != len(first) and not unremarked:
         raise DataError(
             f"{path} has {counted(len(names), 'column name')}, but {counted(len(first), 'column')} in line "
@@ -300,11 +329,7 @@ def _with_header(
     if unremarked:
         of_text |= {len(first)}
     if len(of_text) == len(names):
-        raise DataError(
-            f"{path} has no rows of numbers: all of its lines are words or headings, such as line "
-            f"{begin.number}: {begin.text[:60]!r}",
-            hint="export what is below the headings too: one column per quantity, one row per sample",
-        )
+        raise _no_numbers(path, begin)
     units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
     return Dialect(
         encoding=encoding,
@@ -359,6 +384,11 @@ def _tail(path: Path, encoding: str) -> str:
         stream.seek(start)
         text = stream.read().decode("utf-16-le" if encoding.startswith("utf-16") else "utf-8", "replace")
     return text[text.find("\n") + 1 if start else 0 :]
+
+
+def ends_in_zeros(path: Path, dialect: Dialect) -> bool:
+    """Whether a file ends in zero bytes, as a crash leaves it; OSError where it cannot be read."""
+    return _tail(path, dialect.encoding).endswith("\0")
 
 
 def ends_in_a_number(path: Path, dialect: Dialect) -> bool:

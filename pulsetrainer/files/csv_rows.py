@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_cells import has_thousands, number, readable
+from pulsetrainer.files.csv_cells import has_thousands, is_number, number, quoted
 from pulsetrainer.files.csv_dialect import Dialect, column_words
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
@@ -31,6 +32,7 @@ class Rows:
     columns: tuple[FloatArray, ...]  # each (n,)
     shifts: tuple[tuple[int, int], ...]  # (row, line) wherever comments or blank lines change the distance
     misfit: str  # what is wrong with the first row that cannot be read; empty where all can
+    remedy: str  # what mends that row, where it tells
 
 
 def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece: int = PIECE) -> Rows:
@@ -54,7 +56,19 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece
             values = reader.read(text)
             # a character is a byte, or, in UTF-16, two of them
             kept.append(values, expected=len(values) * size / len(text))
-    return Rows(kept.finished(), tuple(reader.shifts), reader.misfit)
+    return Rows(kept.finished(), tuple(reader.shifts), reader.misfit, reader.remedy)
+
+
+def _of_a_comma(cells: Sequence[str]) -> str:
+    """Say what to do about a row that is too long for a decimal comma; empty where it cannot be one."""
+    pair = next(
+        (p for p in reversed([*pairwise(cells)]) if p[0].lstrip("+-").isdigit() and p[1].isdigit()), None
+    )
+    if pair is None:
+        return ""
+    return (
+        f"if {','.join(pair)} is a decimal comma, write {'.'.join(pair)}, or part the columns by semicolons"
+    )
 
 
 class _Kept:
@@ -98,6 +112,7 @@ class _Reader:
     point: str = ""  # where the first decimal point was, and the first decimal comma
     comma: str = ""
     misfit: str = ""
+    remedy: str = ""
 
     def read(self, text: str) -> FloatArray:
         """Return the rows (n, columns) of the next piece; raises as ``parse``."""
@@ -168,9 +183,12 @@ class _Reader:
             if dialect.text_columns.issuperset(range(len(cells), len(dialect.names))):
                 cells += [""] * (len(dialect.names) - len(cells))  # no remark
             if len(cells) != len(dialect.names):
-                self.misfit = self.misfit or (
+                self._first_misfit(
                     f"{self.path} has {counted(len(cells), 'column')} in line {count}, "
-                    f"expected {len(dialect.names)}: {', '.join(dialect.names)}"
+                    f"expected {len(dialect.names)}: {', '.join(dialect.names)}",
+                    _of_a_comma(cells)
+                    if dialect.delimiter == "," and len(cells) > len(dialect.names)
+                    else "",
                 )
                 continue
             for k, cell in enumerate(cells):
@@ -188,8 +206,13 @@ class _Reader:
             said = f"{self.path} has {self._place(cell, k, line)}: not a number"
             if has_thousands(cell):  # all large values are so: without them the record is another
                 raise DataError(said, hint="export it without thousands separators")
-            self.misfit = self.misfit or said
+            share = cell.removesuffix("%").rstrip()
+            self._first_misfit(said, f"write the numbers without %: {share}" if is_number(share) else "")
         return np.nan if value is None else value
+
+    def _first_misfit(self, said: str, remedy: str) -> None:
+        if not self.misfit:
+            self.misfit, self.remedy = said, remedy
 
     def _look_for_signs(self, line: int, cells: Sequence[str]) -> None:
         """Note the first decimal point and the first decimal comma; raise DataError where there are both."""
@@ -208,4 +231,4 @@ class _Reader:
             )
 
     def _place(self, cell: str, column: int, line: int) -> str:
-        return f"{readable(cell)!r} in {column_words(self.dialect.names[column])}, line {line}"
+        return f"{quoted(cell)} in {column_words(self.dialect.names[column])}, line {line}"

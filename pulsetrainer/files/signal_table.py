@@ -45,6 +45,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
 
     from pulsetrainer.core import excitations  # noqa: PLC0415
     from pulsetrainer.files.csv_dialect import column_words  # noqa: PLC0415
+    from pulsetrainer.files.time_column import unit_of_time  # noqa: PLC0415
 
     table, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")
     unit = table.unit(table.names[1])
@@ -74,7 +75,13 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
         )
     count = int(np.floor(lasts + 1e-9)) + 1
     value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)
-    return excitations.Signal(value, rate_Hz, path.name)
+    note = ""
+    if not unit_of_time(table, table.names[0]):
+        note = (
+            f"the time of {path}, {column_words(table.names[0])}, has no unit: taken as s, so it lasts "
+            f"{seconds:g} s (if it is in ms, write the heading as 't_ms')"
+        )
+    return excitations.Signal(value, rate_Hz, path.name, note)
 
 
 def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, FloatArray]:
@@ -82,7 +89,9 @@ def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, 
     from pulsetrainer.files.table import read_table  # noqa: PLC0415
     from pulsetrainer.files.time_column import seconds  # noqa: PLC0415
 
-    table = read_table(path, lambda head: range(min(2, len(head.names))))
+    if not path.stat().st_size:
+        raise DataError(f"{path} is empty", hint=f"write two columns: {names}")
+    table = read_table(path, lambda head: range(min(2, len(head.names))), remedy="write the table again")
     if len(table.names) < 2:
         raise DataError(f"{path} has {len(table.names)} column; {what}", hint=f"write two columns: {names}")
     return table, seconds(table, table.names[0]), table.check_finite(table.names[1])

@@ -25,10 +25,18 @@ from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
-from pulsetrainer.files.csv_cells import number
-from pulsetrainer.files.csv_dialect import Dialect, cell_at, column_words, detect, ends_in_a_number
+from pulsetrainer.files.csv_cells import number, quoted
+from pulsetrainer.files.csv_dialect import (
+    Dialect,
+    cell_at,
+    column_words,
+    detect,
+    ends_in_a_number,
+    ends_in_zeros,
+)
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
+from pulsetrainer.files.time_stamps import how_to_write
 
 _WRITTEN_ROWS = 1 << 14
 _NAMED = 5  # bad rows
@@ -104,7 +112,8 @@ class Table:
 
         DataError where a value is NaN, infinite or missing: line and column are named.
         """
-        values = self.column(name)
+        name = self.heading(name)
+        values = self.columns[name]
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size == values.size:
             raise DataError(
@@ -133,7 +142,7 @@ class Table:
         cell = cell_at(self.path, self.line_of(row), self.index(name))
         value = number(cell)
         overload = " (an overload)" if value is not None and np.isfinite(value) else ""
-        return f"{cell!r}{overload}" if cell else "a blank cell"
+        return f"{quoted(cell)}{overload}" if cell else "a blank cell"
 
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
@@ -164,13 +173,17 @@ class Table:
     def _of_text(self, k: int) -> DataError:
         """Return what is wrong with a column of text; it may be of numbers, each with its unit."""
         cell = cell_at(self.path, self.line_of(0), k) if self.shifts else ""
-        hint = "name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
-        hint += "01.05.2024 12:34:56"
+        hint = how_to_write(cell) or (
+            "numbers must stand there; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
+            "01.05.2024 12:34:56"
+        )
         if (found := _WITH_UNIT.fullmatch(cell)) and is_unit(found[1]):
             heading = f"{split_unit(self.names[k])[0]} [{found[1]}]"
             hint = f"remove the unit from the cells, and write it in the heading: {heading!r}"
+            if (own := self.units.get(self.names[k])) and own != symbol_of(found[1]):
+                hint = f"the heading says {own}: write the numbers in {own}, not in {found[1]}, and alone"
         said = f"{self.path} has text, not numbers, in {column_words(self.names[k])}"
-        return DataError(f"{said}: {cell!r} in {self.place(0)}", hint=hint)
+        return DataError(f"{said}: {quoted(cell)} in {self.place(0)}", hint=hint)
 
     def _no_column(self, name: str) -> DataError:
         """Return what is wrong with a name that no column has, or that several have."""
@@ -271,10 +284,15 @@ def read_table(
     table = replace(table, columns=columns, shifts=rows.shifts)
     if rows.misfit and not bad_rows:
         bad = table.bad_rows()
+        if bad.size and bad[0] == table.rows - 1 and ends_in_zeros(path, dialect):
+            raise DataError(
+                f"{path} ends in zero bytes, in {table.place(table.rows - 1)}: the recorder stopped there",
+                hint=f"cut the file after line {table.line_of(table.rows - 1) - 1}, or {remedy}",
+            )
+        mend = rows.remedy or f"correct or remove {'that line' if bad.size == 1 else 'those lines'}"
         raise DataError(
             f"{rows.misfit} ({_lacking(bad.size, table.rows)}: {table.places(bad)})",
-            hint=f"correct or remove {'that line' if bad.size == 1 else 'those lines'}, or "
-            f"{_AGAIN if table.mostly(bad) else remedy}",
+            hint=f"{mend}, or {_AGAIN if table.mostly(bad) else remedy}",
         )
     return table
 

@@ -16,9 +16,10 @@ from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.csv_cells import quoted
 from pulsetrainer.files.csv_dialect import cell_at, column_words
 from pulsetrainer.files.table import Table
-from pulsetrainer.files.time_stamps import is_since_1970, stated_rate, unit_of_count
+from pulsetrainer.files.time_stamps import how_to_write, is_since_1970, stated_rate, unit_of_count
 
 LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
 ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the first: it has no name
@@ -62,11 +63,12 @@ def time_of(
         place = own_column(table, {table.index(name) for name in wanted})
         if place is None:
             other = "other " * any(is_called_time(table.heading(name)) for name in wanted)
-            lack = f"{table.path} has no {other}time column" + _unread(table)
-            return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
+            unread, remedy = _unread(table)
+            lack = f"{table.path} has no {other}time column{unread}"
+            return _counted(table, lack, remedy, whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
-        counts = _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s")
+        counts = _just_counts(whole.columns[time]) and unit_of_time(table, time) in ("", "s")
         if counts and not time.endswith(_IN_SECONDS):
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
@@ -89,19 +91,20 @@ def time_of(
     return Time(time_s, words, notes)
 
 
-def _unread(table: Table) -> str:
-    """Say that the column of the date is text: how no time is written that can be read."""
+def _unread(table: Table) -> tuple[str, str]:
+    """Say that the column of the date is text, how no time is written that can be read; and what to do."""
     texts = (own for own in table.names if own in table.text_names)
     name = next((own for own in texts if is_called_time(own) or own.lower() in _DATES), None)
     if name is None or not table.shifts:
-        return ""
+        return "", "give `time` or `rate_Hz`"
     cell = cell_at(table.path, table.line_of(0), table.names.index(name))
-    return f" (its {column_words(name)} could not be read as time: {cell!r})"
+    remedy = f"{how_to_write(cell) or 'give another `time`'}, or give `rate_Hz`"
+    return f" (its {column_words(name)} could not be read as time: {quoted(cell)})", remedy
 
 
 def _taken_as(table: Table, heading: str) -> tuple[str, tuple[str, ...]]:
     """Return the unit of a column of time, by its heading or its size, and what there is to say of that."""
-    unit, first = _unit_of_time(table, heading), float(table.columns[heading][0])
+    unit, first = unit_of_time(table, heading), float(table.columns[heading][0])
     by_size = "" if unit else unit_of_count(first, heading)
     stamped = is_since_1970(first, unit) and not _as_written(table, heading, 0, "")
     if by_size or stamped:
@@ -151,7 +154,8 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     DataError where its unit is none of time, a value is not finite, or it does not increase: the line is
     named.
     """
-    unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
+    name = table.heading(name)
+    unit = unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
         below = not split_unit(table.heading(name))[1] and name in table.units
         raise DataError(
@@ -205,7 +209,7 @@ def _is_winter_time(step: FloatArray, back: NDArray[np.intp]) -> bool:
 def rates_of(table: Table, name: str) -> tuple[float | None, float | None]:
     """Return the rate of a column of time, Hz, by its median step and by its length; None: it is no time."""
     stamps = table.columns[name]
-    unit = _unit_of_time(table, name)
+    unit = unit_of_time(table, name)
     increasing = bool(stamps.size > 1 and np.all(np.isfinite(stamps)) and np.all(np.diff(stamps) >= 0))
     if not unit or unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
         return None, None
@@ -232,7 +236,7 @@ def is_called_time(heading: str) -> bool:
     return split_unit(heading)[0].rpartition(".")[2].lower() in _TIME_NAMES
 
 
-def _unit_of_time(table: Table, name: str) -> str:
+def unit_of_time(table: Table, name: str) -> str:
     """Return the unit of a column of time, empty where the header says none.
 
     ``min`` may be all of it, and ``d`` stands behind a name, where it is a unit of no other column.

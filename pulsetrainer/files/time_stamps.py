@@ -15,6 +15,8 @@ from pulsetrainer.artefacts.units import SECONDS
 
 _TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
 _CLOCK = re.compile(_TIME)
+_SHORT = re.compile(r"\d+:\d\d")
+_DATE = re.compile(r"\d{4}([-/.])\d{1,2}\1\d{1,2}|\d{1,2}([-/.])\d{1,2}\2\d{4}")
 _MINUTES = re.compile(r"(\b)(\d+):([0-5]\d[.,]\d+)(\b)")
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
@@ -54,6 +56,13 @@ def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
         readings = [_stamp(found[3], found[month], found[day], found.groups()[3:]) for month, day in orders]
         return next((reading for reading in readings if reading is not None), None)
     return None
+
+
+def how_to_write(cell: str) -> str:
+    """Say how minutes and seconds, or a date alone, are written so that they are read; empty: other text."""
+    if _SHORT.fullmatch(cell):
+        return "write minutes and seconds with the hour, 0:00:05, or in seconds, 5"
+    return "a date needs a time of day: 2024-05-01T00:00:00" if _DATE.fullmatch(cell) else ""
 
 
 def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:

@@ -83,9 +83,9 @@ def identify(
     Raises
     ------
     DataError
-        The runs differ in their units, or an input does not move.
+        The runs differ in their units, an input does not move, or an output does not vary.
     ArgumentError
-        There are too few samples, an output does not vary, a parameter is out of its range, or relays, the
+        There are too few samples, a parameter is out of its range, or relays, the
         alternating method or a bootstrap are asked for together with another form than the direct one.
     ConvergenceError
         The fit did not settle.
@@ -220,7 +220,7 @@ def _with_samples(titles: Sequence[str], runs: Sequence[Run]) -> tuple[list[str]
 
 
 def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
-    """Range of the input over all runs, or DataError where it does not move."""
+    """Range of the input over all runs, or DataError where it does not move, or the output does not vary."""
     ranges = [left_out.input_range(run) for run in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     if not high > low:
@@ -230,6 +230,14 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
             f"the input of {listed} does not move: it is {with_unit(f'{low:g}', runs[0].input_unit)} "
             "in all samples",
             hint=f"record a run that sweeps the range{command}",
+        )
+    given = np.concatenate([run.output[run.counts] for run in runs])
+    given = given[np.isfinite(given)]
+    if given.size and np.ptp(given) <= 1e-12 * np.abs(given).max():
+        raise DataError(
+            f"the {quantity_in_words(runs[0].output_quantity)} of {', '.join(dict.fromkeys(names))} does not "
+            f"vary: it is {with_unit(f'{given[0]:g}', runs[0].output_unit)} throughout",
+            hint="check the sensor and its wiring, and record again",
         )
     return low, high
 

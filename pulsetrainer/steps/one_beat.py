@@ -40,7 +40,10 @@ def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shap
     return found.mean() if beat == "mean" else found.single(int(beat))
 
 
-def say_if_several(recording: Shape, notes: list[str]) -> None:
+_BY_OPTION = "give `beat` from 1 to {count}, or mean, for a single one"
+
+
+def say_if_several(recording: Shape, notes: list[str], remedy: str = _BY_OPTION) -> None:
     """Say it where a recording of several beats is about to be played as one period."""
     if len(recording.feet_s) > 1:  # it says itself where its beats begin
         return
@@ -51,5 +54,5 @@ def say_if_several(recording: Shape, notes: list[str]) -> None:
     if count > 1:
         notes.append(
             f"{recording.name} holds {count} whole beats, and all of it is played as one period of "
-            f"{with_seconds(recording.period_s)}: give `beat` from 1 to {count}, or mean, for a single one"
+            f"{with_seconds(recording.period_s)}: {remedy.format(count=count)}"
         )

@@ -133,3 +133,13 @@ def test_a_band_from_few_draws_says_so(run, record):
     record()
     done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--bootstrap", "2")
     assert "note: a band from 2 draws says little: --bootstrap 200 is usual" in " ".join(done.err.split())
+
+
+def test_an_output_that_stands_still_is_named_with_its_file_and_unit(run, tmp_path):
+    """Of several runs too, nothing but the file says which sensor was not connected."""
+    rows = "".join(f"{k},{k % 3},1\n" for k in range(9))
+    (tmp_path / "still.csv").write_text(f"t_s,current_A,force_N\n{rows}")
+    columns = ("--input", "current_A", "--output", "force_N")
+    run("import", "still.csv", *columns, "-o", "still.h5")
+    done = run("identify", "still.h5", "-o", "model.h5", "--json")
+    refusal(done, 3, "constant output", file="still.h5")

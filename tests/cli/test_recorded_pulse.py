@@ -68,3 +68,16 @@ def test_a_table_of_several_columns_says_which_one_is_played(small_chain, tmp_pa
     done = pulsetrainer(tmp_path, *words)
     assert done.code == 0, done
     assert ("of the 3 columns of a.csv the second is played, u" in done.err) == (columns == 3)
+
+
+def test_a_session_says_what_it_makes_of_a_recording(small_chain, tmp_path):
+    """As an inversion does: which column is played, and that several beats would be one."""
+    t = np.arange(800) * 0.004
+    p = np.maximum(np.sin(2 * np.pi * t / 0.8), 0.0)
+    table = np.stack([t, p, 2 * p], axis=1)
+    np.savetxt(tmp_path / "scope.csv", table, delimiter=",", header="t_s,p,q", comments="")
+    words = ["session", "--model", small_chain / "model.h5", "-o", "session.h5", "--beats", "2", "--dry-run"]
+    done = pulsetrainer(tmp_path, *words, "--pulses", "normal,scope.csv")
+    assert done.code == 0, done
+    tells(done.err, "second column")
+    tells(done.err, "several beats")

@@ -34,7 +34,7 @@ def test_rows_with_a_blank_cell_are_left_out_when_asked_and_counted(tmp_path):
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
     assert done.code == 3
     assert "--skip-bad-rows" in done.err
-    assert "a blank cell in column y, line 7 (3 of 300 rows" in done.err
+    assert "a blank cell in column y (mm), line 7 (3 of 300 rows" in done.err
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
     assert done.code == 0, done
     assert "3 of 300 rows" in done.err

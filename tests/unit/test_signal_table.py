@@ -10,6 +10,7 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.bounds import read_bounds
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.files.signal_table import read_signal
+from wording import tells
 
 
 def test_a_signal_is_read_at_even_steps(tmp_path):
@@ -23,6 +24,18 @@ def test_a_signal_is_read_at_even_steps(tmp_path):
     with pytest.raises(DataError) as caught:
         read_signal(path, MOST_SAMPLES)
     assert str(MOST_SAMPLES) in str(caught.value)
+
+
+@pytest.mark.parametrize("heading", ["time", "t_s"])
+def test_a_time_without_a_unit_is_told_to_be_taken_as_seconds(tmp_path, heading):
+    """It may be ms: the device would play for a quarter of an hour."""
+    path = tmp_path / "mine.csv"
+    path.write_text(f"{heading},current_A\n0,0\n500,1.2\n1000,0\n")
+    note = read_signal(path, 1000.0).note
+    if heading == "t_s":
+        assert not note
+    else:
+        tells(note, "signal without a unit")
 
 
 def test_a_signal_needs_two_columns(tmp_path):

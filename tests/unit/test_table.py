@@ -1009,3 +1009,15 @@ def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hin
     with pytest.raises(AbsentError) as absent:
         check_file(tmp_path / name)
     assert absent.value.hint == hint.format(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("cell", "remedy"), [("0:0{}", "0:00:05, or in seconds"), ("2024-05-0{}", "needs a time of day")]
+)
+def test_a_time_that_is_not_read_is_told_how_to_be_written(tmp_path, cell, remedy):
+    """Not to be named as the time: it could not be read then either."""
+    rows = "".join(f"{cell.format(k)},{k},{k % 2}\n" for k in range(1, 5))
+    (tmp_path / "t.csv").write_text(f"t_s,u,y\n{rows}")
+    note = run_from_table(tmp_path / "t.csv", **COLUMNS).notes[0]
+    assert remedy in note
+    assert "`time`" not in note
