@@ -553,6 +553,44 @@ _WORDS_OF_A_TIRED_HAND = {
     "the nearest of two commands": ("imprt", 2, "there is no command 'imprt'", "did you mean import?"),
     "a command in capitals": ("SHOW run.h5", 2, "there is no command 'SHOW'", "did you mean show?"),
     "a file as a command": ("run.h5", 2, "no command 'run.h5'", "pulsetrainer show run.h5"),
+    **{
+        f"a port before {name}": (
+            *(f"--port /dev/ttyUSB0 {name}{rest}", 2, "pulsetrainer has no option --port"),
+            f"after the command: pulsetrainer {name}{rest} --port /dev/ttyUSB0",
+        )
+        for name, rest in (
+            *(("doctor", ""), ("check", " model.h5")),
+            ("capture", " identification -o out.h5"),
+        )
+    },
+    "a port before a command that takes none": (
+        *("--port /dev/ttyUSB0 show run.h5", 2, "has no option --port", "leave it out: the command works on"),
+    ),
+    "a force for a capture": (
+        *("capture identification -o out.h5 --force-max 5", 2, "no option --force-max"),
+        "to limit the force: --limit-force 5\n",
+    ),
+    "a force for a session": (
+        *("session --model model.h5 -o out.h5 --force-max=5", 2, "no option --force-max"),
+        "--amplitude, in % of what the model reaches; to limit the force: --limit-force 5\n",
+    ),
+    "a page of a playback": (
+        *("play drive.h5 -o out.h5 --html r.html", 2, "no option --html"),
+        "pulsetrainer evaluate played.h5 --html r.html",
+    ),
+    "a page of a model": (
+        *("identify run.h5 -o out.h5 --html r.html", 2, "no option --html"),
+        "-o diagnosis.h5 --html r.html; for a figure: pulsetrainer plot model.h5",
+    ),
+    "a text of a model": ("show model.h5 -o x.txt", 2, "no option -o", "pulsetrainer export model.h5 -o"),
+    "a rate for a pulse": (
+        *("invert normal --model model.h5 -o out.h5 --rate 75", 2, "no option --rate"),
+        "a pulse has its own rate; in a session: pulsetrainer session --rate 75",
+    ),
+    "a delimiter": (
+        *("import run.csv --input u --output y -o out.h5 --delimiter ;", 2, "no option --delimiter"),
+        "leave it out: the delimiter is recognised",
+    ),
     "an update without its output": (
         *("check model.h5 --update", 2, "--update, which writes the updated model,", "give both"),
     ),
