@@ -610,13 +610,19 @@ def _line(one: Writer, outputs: dict[str, str] | None = None) -> tuple[str, ...]
 
 
 # for the rest the artefacts must be what their names say
+_BARE = ("import", "plain/run.csv", "--input", "2", "--output", "3")
 PREPARATION = (
     (*EXCITATION, "-o", "run.h5"),
     ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
     ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
     ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
     ("session", "--model", "model.h5", "--beats", "2", "-o", "session.h5"),
+    ("export", "run.h5", "-o", "plain/run.csv"),
+    (*_BARE, "--input-unit", "1", "--output-unit", "1", "-o", "plain/run.h5"),
+    ("identify", "plain/run.h5", "--levels", "12", "-o", "plain/model.h5"),
+    ("invert", "normal", "--model", "plain/model.h5", "-o", "plain/drive.h5", "--periods", "1"),
 )
+_UNITS = "with --input-unit A --output-unit N"
 TABLES = {
     "empty.csv": "",
     "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n0,1;2,5;3,5;gut\n",
@@ -653,6 +659,27 @@ INSIDE = {
         )
         for unit, meant in (("v", "V"), ("n", "N"), ("ma", "mA"), ("kpa", "kPa"))
     },
+    **{
+        f"{words[0]} with a {what} in no units": Mistake(
+            words, 3, f"the {what} plain/{what}.h5 is in no units, expected A and N", f"{_UNITS}, and {then}"
+        )
+        for what, then, words in (
+            ("drive", "identify and invert it; or", ("play", "plain/drive.h5", "-o", "out.h5")),
+            ("model", "identify it; or", ("session", "--model", "plain/model.h5", "-o", "out.h5")),
+            ("model", "identify it; or", ("check", "plain/model.h5")),
+        )
+    },
+    **{
+        f"{words[0]} with one of two in no units": Mistake(words, 3, "in no units", f"{table} again {_UNITS}")
+        for table, words in (
+            ("plain/run.h5", ("identify", "plain/run.h5", "run.h5", "-o", "out.h5")),
+            ("plain/run.h5", ("diagnose", "plain/run.h5", "--model", "model.h5", "-o", "out.h5")),
+        )
+    },
+    "a rate that the device does not have": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--rate", "44100"),
+        *(3, "got 44100 Hz", "10000 Hz or a whole fraction of it, such as 5000, 2500, 2000, 1000 Hz"),
+    ),
     "a run and a model exchanged": Mistake(
         ("diagnose", "model.h5", "--model", "run.h5", "-o", "out.h5"),
         *(3, "expected a run, got a model", "pulsetrainer diagnose run.h5 --model model.h5 -o out.h5"),

@@ -10,7 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import counted, quantity_in_words, same_units, shown, units_of, with_unit
+from pulsetrainer.artefacts.units import (
+    counted,
+    quantity_in_words,
+    same_units,
+    shown,
+    units_alike,
+    units_of,
+    with_unit,
+)
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, little_words, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -190,7 +198,8 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
-                hint="identify runs of different devices one by one; of one device, convert the columns of "
+                hint=units_alike(name, run, names[0], first)
+                or "identify runs of different devices one by one; of one device, convert the columns of "
                 "the tables and import them again",
             )
     for what in ("input", "output"):
