@@ -38,6 +38,10 @@ def lay_out(folder: Path) -> None:
     (folder / "pulse.toml").write_text("normal = 3\n")
     (folder / "round.toml").write_text('"normal.continuous.mean_error_reduction_percent" = [98, 90]\n')
     (folder / "words.toml").write_text('"normal.continuous.mean_error_reduction_percent" = ["a", "b"]\n')
+    (folder / "quoted.toml").write_text('current_max_A = "1.2"\n')
+    (folder / "percent.toml").write_text(
+        '"normal.continuous.mean_error_reduction_percent" = ["90%", "98%"]\n'
+    )
     (folder / "-run.h5").write_bytes(SIGNATURE)
     (folder / "back.toml").write_text('port = "C:\\Users"\n')
     (folder / "loop.csv").symlink_to("loop.csv")
@@ -563,6 +567,37 @@ _WORDS_OF_A_TIRED_HAND = {
             ("capture", " identification -o out.h5"),
         )
     },
+    "a table beside a figure": (
+        *("plot run.h5 -o x.svg --data", 2, "beside the figure, as x.csv, which already exists"),
+        "name another figure, such as -o x-2.svg",
+    ),
+    "minutes and seconds": (
+        *(
+            "session --model model.h5 -o out.h5 --minutes 1:30",
+            2,
+            "got '1:30'",
+            "write the number alone, in min: 1.5\n",
+        ),
+    ),
+    "a setting in quotes": (
+        *("--settings quoted.toml show run.h5", 2, "sets current_max_A = '1.2'"),
+        "remove the quotes: current_max_A = 1.2\n",
+    ),
+    "a bound in quotes": (
+        *("evaluate played.h5 --bounds percent.toml", 2, "got ['90%', '98%']"),
+        "= [90.0, 98.0], the lowest first, without quotes and without %",
+    ),
+    "two ports": (
+        *("play drive.h5 -o out.h5 --port bench: --port bench:?seed=3", 2, "--port was given 2 times"),
+        "give it once",
+    ),
+    "a switch both ways": (
+        *("play drive.h5 -o out.h5 --track-heat --no-track-heat", 2, "and takes one of the two", "give it once"),
+    ),
+    "two seeds of a bench": (
+        *("play drive.h5 -o out.h5 --port bench:?seed=3&seed=4", 2, "seed is set more than once, to 3 and 4"),
+        "give seed once",
+    ),
     "a port before a command that takes none": (
         *("--port /dev/ttyUSB0 show run.h5", 2, "has no option --port", "leave it out: the command works on"),
     ),
@@ -827,7 +862,26 @@ INSIDE = {
         *("to 20 N is asked for", "--force-max"),
     ),
     "a run as a signal": Mistake(
-        ("capture", "run.h5", "-o", "out.h5"), 3, "run.h5 is not a text file", "pulsetrainer show run.h5"
+        ("capture", "run.h5", "-o", "out.h5"),
+        *(3, "expected identification, diagnostic or a CSV table, got a run", "such as identification"),
+    ),
+    "a drive as a signal": Mistake(
+        ("capture", "drive.h5", "-o", "out.h5"), 3, "got a drive", "`pulsetrainer play drive.h5 -o played.h5`"
+    ),
+    "a run as a pulse": Mistake(
+        ("invert", "run.h5", "--model", "model.h5", "-o", "out.h5"),
+        *(3, "run.h5: expected the name of a pulse or a CSV table, got a run", "such as normal"),
+    ),
+    "a page to be shown": Mistake(
+        ("show", "page.csv"), 3, "page.csv is a web page", "open it in a browser, or give the .h5"
+    ),
+    "an address of another kind": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "tcp://host:5000", "--dry-run"),
+        *(4, "protocol 'tcp' not known", "socket://host:port"),
+    ),
+    "a percentage for the bench": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?creep=5%"),
+        *(2, "creep=5% is not a number from 0 to 0.5", "write 0.05 for 5 %\n"),
     ),
     "a table whose columns are not named": Mistake(
         ("import", "wide.csv", "-o", "out.h5"), 2, "--input is missing", "--input Spannung --output Kraft"

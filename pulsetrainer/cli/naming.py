@@ -53,10 +53,15 @@ class Command(TyperCommand):
             setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
             raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
-        for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
+        once = [one for one in options if one.type.name == "path" or one.name == "port" or one.secondary_opts]
+        for twice, times in Counter(once).items():
             if times > 1:
+                ways = " or ".join((twice.opts[-1], *twice.secondary_opts))
+                takes = (
+                    "file" if twice.type.name == "path" else "port" if twice.name == "port" else "of the two"
+                )
                 raise UsageError(
-                    f"{name} was given {times} times, and takes one file",
+                    f"{ways} was given {times} times, and takes one {takes}",
                     hint="give it once, or run the command once for each",
                 )
         for one in self.params:
