@@ -592,7 +592,12 @@ _WORDS_OF_A_TIRED_HAND = {
         "give it once",
     ),
     "a switch both ways": (
-        *("play drive.h5 -o out.h5 --track-heat --no-track-heat", 2, "and takes one of the two", "give it once"),
+        *(
+            "play drive.h5 -o out.h5 --track-heat --no-track-heat",
+            2,
+            "and takes one of the two",
+            "give it once",
+        ),
     ),
     "two seeds of a bench": (
         *("play drive.h5 -o out.h5 --port bench:?seed=3&seed=4", 2, "seed is set more than once, to 3 and 4"),

@@ -242,6 +242,11 @@ MESSAGES = {
 # what a command notes besides its result, and what speaks for a diagnosis: pieces of the sentence
 NOTES = {
     "false reversals": ("false reversals",),
+    "a share in the place of %": (
+        "--ectopic of 0.1 % is hardly felt: 10 % is written as 10",
+        "4 % is written as 4",
+    ),
+    "changes after the end": ("1 of 1 change (400 s) will not happen: the session ends at 6 s (--minutes)",),
     "cells never switched": ("never switched", "% of the plane"),
     "reversed": ("falls where the model rises", "the wrong way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),

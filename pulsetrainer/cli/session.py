@@ -82,7 +82,7 @@ def session(
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
-    from pulsetrainer.steps.programme import Change, Programme
+    from pulsetrainer.steps.programme import Change, Programme, hardly_felt, too_late
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, with_quiz
 
@@ -109,8 +109,11 @@ def session(
         else keys.answer,
         seed,
     )
-    if (least := min([amplitude, *(row[2] or amplitude for row in rows)])) < 1.0:
-        job.notes([f"an amplitude of {least:g} % is hardly felt: 40 % is written as 40"])
+    shares = {
+        "an amplitude": min([amplitude, *(row[2] or amplitude for row in rows)]),
+        **{"`variability`": variability, "`respiration`": respiration, "`ectopic`": ectopic},
+    }
+    job.notes(hardly_felt(shares) + too_late([row[0] for row in rows if not (quiz or beats)], minutes))
     beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
     if quiz and (unused := [name for name, value in beside.items() if value is not None]):
         job.notes(
