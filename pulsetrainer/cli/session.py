@@ -111,7 +111,9 @@ def session(
     )
     shares = {
         "an amplitude": min([amplitude, *(row[2] or amplitude for row in rows)]),
-        **{"`variability`": variability, "`respiration`": respiration, "`ectopic`": ectopic},
+        "`variability`": variability,
+        "`respiration`": respiration,
+        "`ectopic`": ectopic,
     }
     job.notes(hardly_felt(shares) + too_late([row[0] for row in rows if not (quiz or beats)], minutes))
     beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
