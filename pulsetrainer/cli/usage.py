@@ -42,7 +42,7 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
         known = NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")
-        known = moved or known.format(behind=behind, value=_value_of(given, words))
+        known = moved or known.format(behind=behind, value=_value_of(given, words)).rstrip()
         if Path(given).is_file():
             known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
@@ -108,7 +108,8 @@ def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
 def _value_of(option: str, words: Sequence[str]) -> str:
     """Return what was typed behind an option, or in it after ``=``, as a shell takes it."""
     at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
-    return shlex.quote("".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2]))
+    value = "".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2])
+    return value and shlex.quote(value)
 
 
 def _as_typed(option: str, words: Sequence[str]) -> str:
