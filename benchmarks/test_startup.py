@@ -128,6 +128,7 @@ def test_every_mistake_in_a_name(table, tmp_path, monkeypatch):
 def test_every_mistake_that_a_look_inside_tells(table, tmp_path, monkeypatch):
     """Usage errors for which an artefact is opened, or the device asked."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "plain").mkdir()
     for words in PREPARATION:
         subprocess.run([sys.executable, "-m", "pulsetrainer", *words], check=True, capture_output=True)  # noqa: S603
     for name, text in TABLES.items():

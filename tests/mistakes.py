@@ -38,6 +38,10 @@ def lay_out(folder: Path) -> None:
     (folder / "pulse.toml").write_text("normal = 3\n")
     (folder / "round.toml").write_text('"normal.continuous.mean_error_reduction_percent" = [98, 90]\n')
     (folder / "words.toml").write_text('"normal.continuous.mean_error_reduction_percent" = ["a", "b"]\n')
+    (folder / "quoted.toml").write_text('current_max_A = "1.2"\n')
+    (folder / "percent.toml").write_text(
+        '"normal.continuous.mean_error_reduction_percent" = ["90%", "98%"]\n'
+    )
     (folder / "-run.h5").write_bytes(SIGNATURE)
     (folder / "back.toml").write_text('port = "C:\\Users"\n')
     (folder / "loop.csv").symlink_to("loop.csv")
@@ -553,6 +557,80 @@ _WORDS_OF_A_TIRED_HAND = {
     "the nearest of two commands": ("imprt", 2, "there is no command 'imprt'", "did you mean import?"),
     "a command in capitals": ("SHOW run.h5", 2, "there is no command 'SHOW'", "did you mean show?"),
     "a file as a command": ("run.h5", 2, "no command 'run.h5'", "pulsetrainer show run.h5"),
+    **{
+        f"a port before {name}": (
+            *(f"--port /dev/ttyUSB0 {name}{rest}", 2, "pulsetrainer has no option --port"),
+            f"after the command: pulsetrainer {name}{rest} --port /dev/ttyUSB0",
+        )
+        for name, rest in (
+            *(("doctor", ""), ("check", " model.h5")),
+            ("capture", " identification -o out.h5"),
+        )
+    },
+    "a table beside a figure": (
+        *("plot run.h5 -o x.svg --data", 2, "beside the figure, as x.csv, which already exists"),
+        "name another figure, such as -o x-2.svg",
+    ),
+    "minutes and seconds": (
+        *(
+            "session --model model.h5 -o out.h5 --minutes 1:30",
+            2,
+            "got '1:30'",
+            "write the number alone, in min: 1.5\n",
+        ),
+    ),
+    "a setting in quotes": (
+        *("--settings quoted.toml show run.h5", 2, "sets current_max_A = '1.2'"),
+        "remove the quotes: current_max_A = 1.2\n",
+    ),
+    "a bound in quotes": (
+        *("evaluate played.h5 --bounds percent.toml", 2, "got ['90%', '98%']"),
+        "= [90.0, 98.0], the lowest first, without quotes and without %",
+    ),
+    "two ports": (
+        *("play drive.h5 -o out.h5 --port bench: --port bench:?seed=3", 2, "--port was given 2 times"),
+        "give it once",
+    ),
+    "a switch both ways": (
+        *(
+            "play drive.h5 -o out.h5 --track-heat --no-track-heat",
+            2,
+            "and takes one of the two",
+            "give it once",
+        ),
+    ),
+    "two seeds of a bench": (
+        *("play drive.h5 -o out.h5 --port bench:?seed=3&seed=4", 2, "seed is set more than once, to 3 and 4"),
+        "give seed once",
+    ),
+    "a port before a command that takes none": (
+        *("--port /dev/ttyUSB0 show run.h5", 2, "has no option --port", "leave it out: the command works on"),
+    ),
+    "a force for a capture": (
+        *("capture identification -o out.h5 --force-max 5", 2, "no option --force-max"),
+        "to limit the force: --limit-force 5\n",
+    ),
+    "a force for a session": (
+        *("session --model model.h5 -o out.h5 --force-max=5", 2, "no option --force-max"),
+        "--amplitude, in % of what the model reaches; to limit the force: --limit-force 5\n",
+    ),
+    "a page of a playback": (
+        *("play drive.h5 -o out.h5 --html r.html", 2, "no option --html"),
+        "pulsetrainer evaluate played.h5 --html r.html",
+    ),
+    "a page of a model": (
+        *("identify run.h5 -o out.h5 --html r.html", 2, "no option --html"),
+        "-o diagnosis.h5 --html r.html; for a figure: pulsetrainer plot model.h5",
+    ),
+    "a text of a model": ("show model.h5 -o x.txt", 2, "no option -o", "pulsetrainer export model.h5 -o"),
+    "a rate for a pulse": (
+        *("invert normal --model model.h5 -o out.h5 --rate 75", 2, "no option --rate"),
+        "a pulse has its own rate; in a session: pulsetrainer session --rate 75",
+    ),
+    "a delimiter": (
+        *("import run.csv --input u --output y -o out.h5 --delimiter ;", 2, "no option --delimiter"),
+        "leave it out: the delimiter is recognised",
+    ),
     "an update without its output": (
         *("check model.h5 --update", 2, "--update, which writes the updated model,", "give both"),
     ),
@@ -572,13 +650,19 @@ def _line(one: Writer, outputs: dict[str, str] | None = None) -> tuple[str, ...]
 
 
 # for the rest the artefacts must be what their names say
+_BARE = ("import", "plain/run.csv", "--input", "2", "--output", "3")
 PREPARATION = (
     (*EXCITATION, "-o", "run.h5"),
     ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
     ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
     ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
     ("session", "--model", "model.h5", "--beats", "2", "-o", "session.h5"),
+    ("export", "run.h5", "-o", "plain/run.csv"),
+    (*_BARE, "--input-unit", "1", "--output-unit", "1", "-o", "plain/run.h5"),
+    ("identify", "plain/run.h5", "--levels", "12", "-o", "plain/model.h5"),
+    ("invert", "normal", "--model", "plain/model.h5", "-o", "plain/drive.h5", "--periods", "1"),
 )
+_UNITS = "with --input-unit A --output-unit N"
 TABLES = {
     "empty.csv": "",
     "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n0,1;2,5;3,5;gut\n",
@@ -615,6 +699,27 @@ INSIDE = {
         )
         for unit, meant in (("v", "V"), ("n", "N"), ("ma", "mA"), ("kpa", "kPa"))
     },
+    **{
+        f"{words[0]} with a {what} in no units": Mistake(
+            words, 3, f"the {what} plain/{what}.h5 is in no units, expected A and N", f"{_UNITS}, and {then}"
+        )
+        for what, then, words in (
+            ("drive", "identify and invert it; or", ("play", "plain/drive.h5", "-o", "out.h5")),
+            ("model", "identify it; or", ("session", "--model", "plain/model.h5", "-o", "out.h5")),
+            ("model", "identify it; or", ("check", "plain/model.h5")),
+        )
+    },
+    **{
+        f"{words[0]} with one of two in no units": Mistake(words, 3, "in no units", f"{table} again {_UNITS}")
+        for table, words in (
+            ("plain/run.h5", ("identify", "plain/run.h5", "run.h5", "-o", "out.h5")),
+            ("plain/run.h5", ("diagnose", "plain/run.h5", "--model", "model.h5", "-o", "out.h5")),
+        )
+    },
+    "a rate that the device does not have": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--rate", "44100"),
+        *(3, "got 44100 Hz", "10000 Hz or a whole fraction of it, such as 5000, 2500, 2000, 1000 Hz"),
+    ),
     "a run and a model exchanged": Mistake(
         ("diagnose", "model.h5", "--model", "run.h5", "-o", "out.h5"),
         *(3, "expected a run, got a model", "pulsetrainer diagnose run.h5 --model model.h5 -o out.h5"),
@@ -762,7 +867,26 @@ INSIDE = {
         *("to 20 N is asked for", "--force-max"),
     ),
     "a run as a signal": Mistake(
-        ("capture", "run.h5", "-o", "out.h5"), 3, "run.h5 is not a text file", "pulsetrainer show run.h5"
+        ("capture", "run.h5", "-o", "out.h5"),
+        *(3, "expected identification, diagnostic or a CSV table, got a run", "such as identification"),
+    ),
+    "a drive as a signal": Mistake(
+        ("capture", "drive.h5", "-o", "out.h5"), 3, "got a drive", "`pulsetrainer play drive.h5 -o played.h5`"
+    ),
+    "a run as a pulse": Mistake(
+        ("invert", "run.h5", "--model", "model.h5", "-o", "out.h5"),
+        *(3, "run.h5: expected the name of a pulse or a CSV table, got a run", "such as normal"),
+    ),
+    "a page to be shown": Mistake(
+        ("show", "page.csv"), 3, "page.csv is a web page", "open it in a browser, or give the .h5"
+    ),
+    "an address of another kind": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "tcp://host:5000", "--dry-run"),
+        *(4, "protocol 'tcp' not known", "socket://host:port"),
+    ),
+    "a percentage for the bench": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?creep=5%"),
+        *(2, "creep=5% is not a number from 0 to 0.5", "write 0.05 for 5 %\n"),
     ),
     "a table whose columns are not named": Mistake(
         ("import", "wide.csv", "-o", "out.h5"), 2, "--input is missing", "--input Spannung --output Kraft"

@@ -95,7 +95,9 @@ MESSAGES = {
     ),
     # --- numbers -----------------------------------------------------------------------------------------
     "force out of reach": Message("is asked for", "--force-max", expected="reaches 0.5", got="40 N"),
-    "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
+    "no such rate": Message(
+        "the rate", "10000 Hz or a whole fraction of it", expected="10000 Hz", got="{got} Hz"
+    ),
     "too slow": Message("the signal would have", "(0.75 is usual)", got="{got} samples"),
     "too fast": Message("between two samples", "(0.75 is usual)", expected="1.5", got="1e+297"),
     "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
@@ -131,6 +133,9 @@ MESSAGES = {
     "another model": Message("is not the model", "pulsetrainer diagnose"),
     "nothing to take out": Message("neither a diagnosis nor a delay", "`diagnosis`"),
     "delay too long": Message("is only", "seconds", expected="{length}", got="a delay of {given}"),
+    "no units": Message(
+        "in no units", "table of {file} again with --input-unit A --output-unit N, and", "{file}", "A and N"
+    ),
     "another kind of device": Message("takes", "captured on the device", "the model {file}", "(A and N)"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),
     "nothing to draw": Message("nothing to draw", ""),
@@ -240,6 +245,11 @@ MESSAGES = {
 # what a command notes besides its result, and what speaks for a diagnosis: pieces of the sentence
 NOTES = {
     "false reversals": ("false reversals",),
+    "a share in the place of %": (
+        "--ectopic of 0.1 % is hardly felt: 10 % is written as 10",
+        "4 % is written as 4",
+    ),
+    "changes after the end": ("1 of 1 change (400 s) will not happen: the session ends at 6 s (--minutes)",),
     "cells never switched": ("never switched", "% of the plane"),
     "reversed": ("falls where the model rises", "the wrong way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),

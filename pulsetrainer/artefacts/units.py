@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from pulsetrainer.errors import DataError
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Model, Run
+    from pulsetrainer.artefacts import Model, Run, Waveform
 
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
 _PREFIXED_SYMBOLS = """
@@ -165,6 +165,21 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
 def same_units(ours: Sequence[str], theirs: Sequence[str]) -> bool:
     """Tell whether units are one by one the same; ``um`` is ``µm``."""
     return [_with_micro(one) for one in ours] == [_with_micro(one) for one in theirs]
+
+
+def as_parameters(input_unit: str, output_unit: str) -> str:
+    """Return units as they are given to what reads a table."""
+    return f"`input_unit` {input_unit} `output_unit` {output_unit}"
+
+
+def units_alike(name: str, one: Run | Model, other_name: str, other: Run | Model) -> str:
+    """Say how two come to the same units, where those of one alone are known; else empty."""
+    bare = [not set(map(shown, (each.input_unit, each.output_unit))) - {""} for each in (one, other)]
+    if bare[0] == bare[1]:
+        return ""
+    known, lacks, noun = (other, name, one) if bare[0] else (one, other_name, other)
+    anew = f"import the table of {lacks} again with {as_parameters(known.input_unit, known.output_unit)}"
+    return f"of one device, {anew}{', and identify it again' * (noun.kind == 'model')}"
 
 
 def _with_micro(unit: str) -> str:
@@ -345,7 +360,7 @@ def unit_of_axis(seconds: float) -> tuple[str, float]:
     return next((unit, one) for unit, one, least in _EASY if seconds >= least or unit == "s")
 
 
-def units_of(measured: Run | Model) -> str:
+def units_of(measured: Run | Model | Waveform) -> str:
     """Return the units of an input and an output in words: ``A and N``; ``no units`` where there are none."""
     units = [shown(unit) for unit in (measured.input_unit, measured.output_unit)]
     return " and ".join(unit or "no unit" for unit in units) if any(units) else "no units"

@@ -13,8 +13,6 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.errors import DataError
 
-_LONG = 0.01  # of the run: no recorder is so late
-
 
 def correct(
     context: Context,
@@ -47,12 +45,5 @@ def correct(
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     from pulsetrainer.report import diagnosis_results as results
 
-    if results.is_unchanged(measured, corrected):
-        why = results.UNSEEN if "quantisation" in corrected.corrected else results.ELSEWHERE
-        job.notes([f"{why}, so the output is left as it was"])
-    if measured.time_s is not None and delay > _LONG * (measured.time_s[-1] - measured.time_s[0]):
-        job.notes(
-            [f"{delay:g} s is a long delay for this run; --delay is in seconds: 5 ms are --delay 0.005"]
-        )
-    job.notes(["a run that the model is tested on may have the same fault: diagnose and correct it too"])
+    job.notes(results.notes_on(measured, corrected, delay))
     job.show(*results.corrected(out, measured, corrected))

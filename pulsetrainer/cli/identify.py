@@ -14,8 +14,6 @@ from pulsetrainer.steps.arguments import MOST_FITTED, check_once
 
 Reading = Literal["continuous", "relay"]
 
-_FEW_DRAWS = 20  # fewer have no quantiles of 5 and 95 %
-
 
 def identify(
     context: Context,
@@ -90,8 +88,6 @@ def identify(
         job.save(out, model, f"Preisach model of {', '.join(path.stem for path in runs)}")
     assert model.fit is not None
     job.notes(model.fit.notes)
-    if 0 < bootstrap < _FEW_DRAWS:
-        job.notes([f"a band from {bootstrap} draws says little: --bootstrap 200 is usual"])
     if model.fit.warning:
         job.screen.line("warning: ", model.fit.warning)
     from pulsetrainer.report.results import identified

@@ -36,6 +36,16 @@ NO_OPTION = {
     "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
     "invert --amplitude": "the height of a drive is a force: --force-max, and --force-min",
     "ports --port": "to look at one: pulsetrainer doctor --port PORT",
+    "capture --force-max": "to limit the force: --limit-force {value}",
+    "session --force-max": "the height is --amplitude, in % of what the model reaches; to limit the force: "
+    "--limit-force {value}",
+    "play --html": "evaluate writes it: pulsetrainer evaluate played.h5 --html {value}",
+    "identify --html": "diagnose writes it: pulsetrainer diagnose run.h5 --model model.h5 -o diagnosis.h5 "
+    "--html {value}; for a figure: pulsetrainer plot model.h5",
+    "show -o": "to write a table: pulsetrainer export model.h5 -o model.csv",
+    "show --out": "to write a table: pulsetrainer export model.h5 -o model.csv",
+    "invert --rate": "a pulse has its own rate; in a session: pulsetrainer session --rate {value}",
+    "import --delimiter": "leave it out: the delimiter is recognised",
     "--version": "pulsetrainer --version",
     "--port": "leave it out: the command works on files, and needs no device",
     "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",

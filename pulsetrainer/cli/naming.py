@@ -53,10 +53,15 @@ class Command(TyperCommand):
             setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
             raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
-        for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
+        once = [one for one in options if one.type.name == "path" or one.name == "port" or one.secondary_opts]
+        for twice, times in Counter(once).items():
             if times > 1:
+                ways = " or ".join((twice.opts[-1], *twice.secondary_opts))
+                takes = (
+                    "file" if twice.type.name == "path" else "port" if twice.name == "port" else "of the two"
+                )
                 raise UsageError(
-                    f"{name} was given {times} times, and takes one file",
+                    f"{ways} was given {times} times, and takes one {takes}",
                     hint="give it once, or run the command once for each",
                 )
         for one in self.params:
@@ -103,7 +108,7 @@ class Command(TyperCommand):
 
 def _with_file(said: str, given: Any) -> str:
     """Return a message with the file of the model, the drive or the bounds that it begins with."""
-    found = re.match(r"the (model|drive|bounds) (?=takes |is of |name |does not know )", said)
+    found = re.match(r"the (model|drive|bounds) (?=takes |is of |is in |name |does not know )", said)
     file = given.get(found[1]) if found else None
     file = file[0] if isinstance(file, list | tuple) and len(file) == 1 else file
     return f"{found[0]}{file} {said[found.end() :]}" if found and isinstance(file, str | Path) else said

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,8 @@ from typer import Context, Option
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AnyFile, AsJson, Overwrite
 from pulsetrainer.cli.outputs import figure_format
+from pulsetrainer.errors import UsageError
+from pulsetrainer.files.output_name import free
 
 
 def plot(
@@ -31,6 +34,12 @@ def plot(
     out = out or file.with_suffix(".png")
     form = figure_format(out, "a figure")
     table = out.with_suffix(".csv") if data else None
+    if table is not None and table.exists() and not overwrite and not out.exists():
+        other = shlex.quote(str(free(table).with_suffix(out.suffix)))
+        raise UsageError(
+            f"--data writes its table beside the figure, as {table}, which already exists",
+            hint=f"name another figure, such as -o {other}, or give --overwrite to replace the table",
+        )
     job = Job(context, inputs=(file,), outputs=(out, table))
     artefact = job.load_any(file)
     from pulsetrainer.errors import DataError

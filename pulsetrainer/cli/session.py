@@ -13,9 +13,6 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from pulsetrainer.core.pulses import Shape
     from pulsetrainer.files.provenance import Header
     from pulsetrainer.steps.performance import Now
 
@@ -84,7 +81,8 @@ def session(
     from pulsetrainer.cli.keys import Keys
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
-    from pulsetrainer.steps.programme import Change, Programme
+    from pulsetrainer.steps.one_beat import notes_of_tables
+    from pulsetrainer.steps.programme import Change, Programme, hardly_felt, too_late
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, with_quiz
 
@@ -111,8 +109,18 @@ def session(
         else keys.answer,
         seed,
     )
-    if (least := min([amplitude, *(row[2] or amplitude for row in rows)])) < 1.0:
-        job.notes([f"an amplitude of {least:g} % is hardly felt: 40 % is written as 40"])
+    shares = {
+        "an amplitude": min([amplitude, *(row[2] or amplitude for row in rows)]),
+        "`variability`": variability,
+        "`respiration`": respiration,
+        "`ectopic`": ectopic,
+    }
+    shapes = [read_pulse(name) for name in names]
+    job.notes(
+        hardly_felt(shares)
+        + too_late([row[0] for row in rows if not (quiz or beats)], minutes)
+        + notes_of_tables(one for one, name in zip(shapes, names, strict=True) if name not in library())
+    )
     beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
     if quiz and (unused := [name for name, value in beside.items() if value is not None]):
         job.notes(
@@ -123,8 +131,6 @@ def session(
         "rates": rates,
         "track_heat": track_heat,
     }
-    shapes = [read_pulse(name) for name in names]
-    job.notes(_of_tables(shape for shape, name in zip(shapes, names, strict=True) if name not in library()))
     steered = keys.steer(job.screen, chosen, shapes, by_key=answers is None)
     if dry_run:
         job.check_device()
@@ -162,14 +168,3 @@ def session(
             lead_s=LIVE_LEAD_S if steered.by_key and not quiz else LEAD_S, watch=watch, **asked,
         )  # fmt: skip
     say_pressed(job, out, html, done, questions, device.info)
-
-
-def _of_tables(shapes: Iterable[Shape]) -> list[str]:
-    """Say what a session makes of pulses that are none of the library."""
-    from pulsetrainer.steps.one_beat import say_if_several
-
-    notes: list[str] = []
-    for shape in shapes:
-        notes += [shape.note] if shape.note else []
-        say_if_several(shape, notes, "write a single beat into a table of its own")
-    return notes

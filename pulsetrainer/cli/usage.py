@@ -37,11 +37,12 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
         given = _as_typed(str(getattr(error, "option_name", "")), words)
-        near = _alike(given, context)
-        hint = f"did you mean {' or '.join(near)}?" if near else _elsewhere(given, context, words) or help_
+        near, moved = _alike(given, context), _elsewhere(given, context, words)
+        hint = f"did you mean {' or '.join(near)}?" if near else help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
-        known = (NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")).format(behind=behind)
+        known = NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")
+        known = moved or known.format(behind=behind, value=_value_of(given, words)).rstrip()
         if Path(given).is_file():
             known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
@@ -93,7 +94,7 @@ def check_apart(words: Sequence[str]) -> None:
 def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
     """Return the line with an option on the side of the command that it belongs to; else empty."""
     commands = getattr(getattr(context, "command", None), "commands", {})
-    at = next(k for k, word in enumerate(words) if word.partition("=")[0] == option)
+    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
     if option == "--settings":
         end, side = at + 1 + ("=" not in words[at]), "before"
         line = [*(*words, "FILE")[at:end], *words[:at], *words[end:]]
@@ -102,6 +103,13 @@ def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
         end, side = next((k for k, word in enumerate(words) if k > at and word in own), at), "after"
         line = [*words[:at], *words[end:], *words[at:end]]
     return f"put it {side} the command: {shlex.join(['pulsetrainer', *line])}" if line != [*words] else ""
+
+
+def _value_of(option: str, words: Sequence[str]) -> str:
+    """Return what was typed behind an option, or in it after ``=``, as a shell takes it."""
+    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
+    value = "".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2])
+    return value and shlex.quote(value)
 
 
 def _as_typed(option: str, words: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
 _SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}  # as in units, which loads numpy
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
+_CLOCK = re.compile(r", got '(\d+):([0-5]\d)'$")  # minutes and seconds
 _UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
 
 
@@ -82,6 +83,7 @@ def check_finite(context: Any) -> None:
 
 def _as_a_number(parameter: Any, must: str) -> str:
     """How the number is written that was given with a decimal comma, or with its unit; else empty."""
+    must = _CLOCK.sub(lambda at: f", got '{int(at[1]) + int(at[2]) / 60:.4g}min'", must)
     given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
     if given is None:
         return ""

@@ -82,7 +82,27 @@ def find_opener(port: str) -> Opener | None:
             hint=f"a port is {''.join(f'{known}:, ' for known in _OPENERS)}/dev/ttyUSB0, COM3 or "
             "socket://host:port",
         )
+    if slashes and scheme not in _OPENERS:
+        _check_url(port)
     return _OPENERS.get(scheme)
+
+
+def _check_url(port: str) -> None:
+    """Raise DeviceError for ``tcp://`` and its like, which pyserial does not know; nothing is opened."""
+    import serial  # noqa: PLC0415 - slow to load, and needed by few ports
+
+    try:
+        serial.serial_for_url(port, do_not_open=True)
+    except ValueError as error:
+        raise not_a_port(port, error) from error
+
+
+def not_a_port(port: str, error: Exception) -> DeviceError:
+    """Return what to tell about a text that makes no sense as a port."""
+    return DeviceError(
+        f"{port!r} is not a port: {error}",
+        hint="a port is bench:, qemu:, /dev/ttyUSB0, COM3 or socket://host:port",
+    )
 
 
 def redact(port: str) -> str:

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import serial
 
 from pulsetrainer.device.ports import cannot_open
+from pulsetrainer.device.schemes import not_a_port
 from pulsetrainer.errors import DeviceError
 
 BAUD = 921_600  # U1BRG = 18 on the real device: 0.04 % off
@@ -57,10 +58,7 @@ class SerialTransport:
                 self._serial.rts = False
             self._serial.open()
         except (ValueError, LookupError) as error:  # pyserial's way to say that the text makes no sense
-            raise DeviceError(
-                f"{port!r} is not a port: {error}",
-                hint="a port is bench:, qemu:, /dev/ttyUSB0, COM3 or socket://host:port",
-            ) from error
+            raise not_a_port(port, error) from error
         except Exception as error:
             raise cannot_open(port, error) from error
 

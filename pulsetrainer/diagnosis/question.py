@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.artefacts.units import counted, same_units, units_of, with_unit
+from pulsetrainer.artefacts.units import counted, same_units, units_alike, units_of, with_unit
 from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray, ends_of
@@ -79,7 +79,8 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     if not same_units((run.input_unit, run.output_unit), (model.input_unit, model.output_unit)):
         raise DataError(
             f"{name} is in {units_of(run)}, but {model_name} was identified in {units_of(model)}",
-            hint="use a model of the same device; in other units, convert the columns and import again",
+            hint=units_alike(name, run, model_name, model)
+            or "use a model of the same device; in other units, convert the columns and import again",
         )
     if model.reading != "continuous":
         raise DataError(

@@ -31,12 +31,14 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case _:
                 usual = [90.0, 100.0]
                 with contextlib.suppress(TypeError, ValueError):  # the wrong way round, or in quotes
-                    low, high = sorted(map(float, pair))
+                    low, high = sorted(float(str(one).rstrip("% ")) for one in pair)
                     if math.isfinite(high - low):
                         usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
                 tables = re.search(r"^\s*\[", path.read_text(encoding="utf-8"), re.MULTILINE)
                 key = name.rpartition(".")[2] if tables else json.dumps(name)
                 hint = f"write {key} = {usual}, the lowest first"
+                if "'" in repr(pair):
+                    hint += ", without quotes and without %"
                 if type(pair) in (int, float):
                     least = f"[{pair}, {100 if pair <= 100 else 'inf'}] if at least {pair} is meant"
                     hint = f"write {key} = {least}, [0, {pair}] if at most"

@@ -14,7 +14,14 @@ from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
-from pulsetrainer.errors import AbsentError, DamagedFileError, DataError, NotAnArtefactError, UsageError
+from pulsetrainer.errors import (
+    AbsentError,
+    DamagedFileError,
+    DataError,
+    NotAnArtefactError,
+    UsageError,
+    in_words,
+)
 from pulsetrainer.files.checksum import is_as_written
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -28,6 +35,17 @@ def check_file(path: Path | str) -> None:
     _first_bytes(Path(path))
 
 
+def check_table(path: Path, expected: str, instead: str) -> None:
+    """Raise as ``check_file``, and DataError for an artefact where a name or a table is ``expected``."""
+    check_file(path)
+    if kind := likely_kind(path):
+        play = f"to play a drive: `pulsetrainer play {shlex.quote(str(path))} -o played.h5`"
+        raise DataError(
+            f"{path}: expected {expected} or a CSV table, got a {in_words([kind])}",
+            hint=play if kind == "waveform" else instead,
+        )
+
+
 def check_artefact(path: Path | str) -> None:
     """Raise DataError for an input that cannot be an artefact, by its first bytes.
 
@@ -36,6 +54,11 @@ def check_artefact(path: Path | str) -> None:
     start = _first_bytes(Path(path))
     if not start:
         raise DamagedFileError(f"{path} is empty", path=path)
+    if start.lstrip().lower().startswith((b"<!doc", b"<html")):
+        raise DataError(
+            f"{path} is a web page, expected a .h5 file of pulsetrainer",
+            hint="open it in a browser, or give the .h5 that it was made from",
+        )
     if not start.startswith((HDF5, JOURNAL)):
         raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.input_file import check_file
+from pulsetrainer.files.input_file import check_table
 from pulsetrainer.resources import waveforms_dir
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def pulse_file(name: str) -> Path:
             if "," in name:  # a session parts them there
                 hint = "one pulse at a time: run it once for each, with an output of its own"
         raise UsageError(f"there is no pulse {name!r}; the library has {', '.join(known)}", hint=hint)
-    check_file(path)
+    check_table(path, "the name of a pulse", "write the name of a pulse in its place, such as normal")
     return path
 
 

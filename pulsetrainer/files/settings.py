@@ -159,10 +159,12 @@ def _value(path: Path, key: str, value: Any) -> Any:
         value = float(value)
     if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
         wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
-        name = key.rpartition(".")[2]
+        name, usual, how = key.rpartition(".")[2], setting.usual, "write, for instance,"
+        if setting.kind is not str and re.fullmatch(r"\d+(\.\d+)?" * isinstance(value, str), str(value)):
+            usual, how = value, "remove the quotes:"
         raise UsageError(
             f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}",
-            hint=f"write, for instance, {_in_its_table(key, f'{name} = {setting.usual}')}",
+            hint=f"{how} {_in_its_table(key, f'{name} = {usual}')}",
         )
     return value
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.input_file import check_file
+from pulsetrainer.files.input_file import check_table
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray
@@ -31,7 +31,7 @@ def signal_file(signal: str, known: Sequence[str]) -> Path | None:
             f"there is no signal {signal!r}; known signals: {', '.join(known)}, or a CSV file",
             hint="pulsetrainer capture identification -o run.h5",
         )
-    check_file(path)
+    check_table(path, ", ".join(known), "write the name of a signal in its place, such as identification")
     return path
 
 

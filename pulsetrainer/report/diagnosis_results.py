@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from pulsetrainer.artefacts import Diagnosis, Model, ModelEvaluation, Run
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.diagnosis.causes import library
@@ -24,6 +26,7 @@ _BASELINE: Final = (
 _EXTENDED: Final = (
     "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
 )  # fmt: skip
+LONG = 0.01  # of a run: no recorder is so late
 # why a corrected run is as it was: of coarse steps; of a fault that another of the recordings has
 UNSEEN = "nothing shows what lies between the steps"
 ELSEWHERE = "what was found lies wholly outside this run, in another of the recordings that were diagnosed"
@@ -136,6 +139,19 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
     filled = ", filled in between their neighbours" if masked else ""
     rows["samples left out"] = f"{masked} of {made.output.size}{filled}"
     return payload, f"{out}: corrected run", rows
+
+
+def notes_on(measured: Run, made: Run, delay_s: float) -> list[str]:
+    """Say what a person should know of a corrected run, and of a delay (s) that was given."""
+    notes = []
+    if is_unchanged(measured, made):
+        why = UNSEEN if "quantisation" in made.corrected else ELSEWHERE
+        notes.append(f"{why}, so the output is left as it was")
+    if measured.time_s is not None and delay_s > LONG * float(np.ptp(measured.time_s)):
+        notes.append(
+            f"{delay_s:g} s is a long delay for this run; --delay is in seconds: 5 ms are --delay 0.005"
+        )
+    return [*notes, "a run that the model is tested on may have the same fault: diagnose and correct it too"]
 
 
 def is_unchanged(measured: Run, made: Run) -> bool:

@@ -58,6 +58,8 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             hint = f"give {name} a value in that range; it sets: {meaning}"
             if re.fullmatch(r"-?\d+,\d+", value):
                 hint = f"write it with a point: {name}={value.replace(',', '.')}"
+            if (share := re.fullmatch(r"(\d+(?:\.\d+)?)%", value)) and unit == "1":
+                hint = f"write {float(share[1]) / 100:g} for {share[1]} %"
             if re.search(r"[,;]\w+=", value):
                 several = f"bench:?{name}={re.sub('[,;]', '&', value)}"
                 hint = f"put & between parameters, and quotes around them: `port` '{several}'"

@@ -119,6 +119,16 @@ def _number_of_device(text: str, name: str = "serial") -> str:
     return text
 
 
+def _pairs(text: str) -> list[tuple[str, str]]:
+    """Return names and values in a port's text; UsageError where one is set twice: but break, which adds."""
+    pairs = parse_qsl(text, keep_blank_values=True)
+    names = [name for name, _ in pairs]
+    if twice := next((name for name in names if name != "break" and names.count(name) > 1), ""):
+        said = " and ".join(value for name, value in pairs if name == twice)
+        raise UsageError(f"`port`: {twice} is set more than once, to {said}", hint=f"give {twice} once")
+    return pairs
+
+
 def parse_bench(port: str) -> BenchOptions:
     """Return the options in ``bench:?ideal&creep=0.05&speed=real``, or raise UsageError.
 
@@ -131,7 +141,7 @@ def parse_bench(port: str) -> BenchOptions:
             hint='write it like one of these: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     asked = BenchOptions()
-    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
+    for name, value in _pairs(match[1] or ""):
         if name == "ideal":
             asked = replace(asked, ideal=_switch(value))
         elif name == "speed":
@@ -171,7 +181,7 @@ def parse_qemu(port: str) -> QemuOptions:
             f"`port`: {port!r} is not a port", hint='`port` "qemu:" alone, or "qemu:?break=reset@1"'
         )
     asked = QemuOptions()
-    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
+    for name, value in _pairs(match[1] or ""):
         if name in QEMU_SETTINGS:
             asked = replace(asked, settings=(*asked.settings, (name, _setting(name, value))))
         elif name == "break":

@@ -10,7 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import counted, quantity_in_words, same_units, shown, units_of, with_unit
+from pulsetrainer.artefacts.units import (
+    counted,
+    quantity_in_words,
+    same_units,
+    shown,
+    units_alike,
+    units_of,
+    with_unit,
+)
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, little_words, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -29,6 +37,7 @@ TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
 SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 LEVELS = 48  # where nothing else is asked for
 FEWEST_LEVELS = 4
+_FEW_DRAWS = 20  # fewer have no quantiles of 5 and 95 %
 _CROWDED = "the loop is steep: the levels lie closer where the output changes"
 WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
@@ -190,7 +199,8 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
-                hint="identify runs of different devices one by one; of one device, convert the columns of "
+                hint=units_alike(name, run, names[0], first)
+                or "identify runs of different devices one by one; of one device, convert the columns of "
                 "the tables and import them again",
             )
     for what in ("input", "output"):
@@ -273,6 +283,8 @@ def _resampled(fitted: Fitted, draws: int, seed: int, notes: list[str]) -> uncer
         notes.append(f"the bootstrap is of the direct form; the {fitted.form} form has no intervals")
     if not draws or fitted.form != "direct":
         return None
+    if draws < _FEW_DRAWS:
+        notes.append(f"a band from {draws} draws says little: `bootstrap` 200 is usual")
     rng = np.random.default_rng(seed)
     return uncertainty.bootstrap(fitted.records, fitted.identified, rng=rng, draws=draws)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from pulsetrainer.artefacts import Waveform
@@ -41,6 +43,15 @@ def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shap
 
 
 _BY_OPTION = "give `beat` from 1 to {count}, or mean, for a single one"
+
+
+def notes_of_tables(shapes: Iterable[Shape]) -> list[str]:
+    """Say what a session makes of pulses that are none of the library."""
+    notes: list[str] = []
+    for shape in shapes:
+        notes += [shape.note] if shape.note else []
+        say_if_several(shape, notes, "write a single beat into a table of its own")
+    return notes
 
 
 def say_if_several(recording: Shape, notes: list[str], remedy: str = _BY_OPTION) -> None:

@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
-from pulsetrainer.artefacts import Model
+from pulsetrainer.artefacts import Model, Waveform
+from pulsetrainer.artefacts.units import as_parameters, units_of
 from pulsetrainer.device.device import Device
 from pulsetrainer.errors import DataError
 
+EXPORT = "for an amplifier of your own, pulsetrainer export writes the drive as a table"
+_ANEW = {
+    "model": "identify a run that was captured on the device",
+    "drive": f"identify and invert a run that was captured on the device; {EXPORT}",
+}
 
-def check_units(model: Model) -> None:
-    """Raise DataError for a model that is not from A to N."""
-    if (model.input_unit, model.output_unit) != ("A", "N"):
+
+def check_units(noun: Model | Waveform) -> None:
+    """Raise DataError for a model or a drive that is not from A to N."""
+    what, again = ("model", "identify it") if isinstance(noun, Model) else ("drive", "identify and invert it")
+    units = (noun.input_unit, noun.output_unit)
+    hint = _ANEW[what]
+    if "1" in units:
         raise DataError(
-            f"the model takes {model.input_unit} and gives {model.output_unit}, so it is not a model of this "
-            "device (A and N)",
-            hint="identify a run that was captured on the device",
+            f"the {what} is in {units_of(noun)}, expected A and N",
+            hint=f"import its table again with {as_parameters('A', 'N')}, and {again}; or {hint}",
+        )
+    if units != ("A", "N"):
+        raise DataError(
+            f"the {what} takes {units[0]} and gives {units[1]}, so it is not a {what} of this device "
+            "(A and N)",
+            hint=hint,
         )
 
 

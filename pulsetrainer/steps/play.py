@@ -22,6 +22,7 @@ from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError
 from pulsetrainer.steps.heat import Tracked, coil_of
+from pulsetrainer.steps.own_device import EXPORT, check_units
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -197,26 +198,13 @@ def _check(drive: Waveform, repeats: int) -> None:
     if repeats < 1:
         raise ArgumentError(f"repeats must be at least 1, got {repeats}", hint="5 is usual")
     check_size(repeats, 2 * drive.compensated.size)
-    check_drive(drive)
-
-
-def check_drive(drive: Waveform) -> None:
-    """Raise DataError where a drive is not of a current in A that is to give a force in N."""
-    if (drive.input_unit, drive.output_unit) != ("A", "N"):
-        raise DataError(
-            f"the drive takes {drive.input_unit} and gives {drive.output_unit}, so it is not a drive of this "
-            "device (A and N)",
-            hint=f"identify and invert a run that was captured on the device; {_EXPORT}",
-        )
-
-
-_EXPORT = "for an amplifier of your own, pulsetrainer export writes the drive as a table"
+    check_units(drive)
 
 
 def _elsewhere(drive: Waveform) -> str:
     """Say where a drive for another device is played; empty where it may be for ours."""
     imported = drive.model is not None and not drive.model.captured
-    return f"if its model is of another device, play it there: {_EXPORT}" if imported else ""
+    return f"if its model is of another device, play it there: {EXPORT}" if imported else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.conductor import Decision, Play
@@ -61,6 +62,27 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
             f"got {minutes:g}",
             hint="a usual length is 5; for a few beats give `beats` 20",
         )
+
+
+def hardly_felt(shares: Mapping[str, float]) -> list[str]:
+    """Say which shares of a session, %, are so small that they may have been meant as parts of one."""
+    return [
+        f"{name} of {share:g} % is hardly felt: {100 * share:g} % is written as {100 * share:g}"
+        for name, share in shares.items()
+        if 0.0 < share < 1.0
+    ]
+
+
+def too_late(times_s: Sequence[float], minutes: float | None) -> list[str]:
+    """Say how many of the changes at these times (s) come after the end of a session."""
+    end_s = 60.0 * (USUAL_MINUTES if minutes is None else minutes)
+    late = [time_s for time_s in times_s if time_s >= end_s]
+    if not late:
+        return []
+    which = (
+        f"{len(late)} of {counted(len(times_s), 'change')} ({late[0]:g} s{' and later' * (len(late) > 1)})"
+    )
+    return [f"{which} will not happen: the session ends at {end_s:g} s (`minutes`)"]
 
 
 def number_of(name: str, pulses: Sequence[str]) -> int:

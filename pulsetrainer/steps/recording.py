@@ -285,7 +285,8 @@ def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
     if decimation < 1 or not np.isclose(decimation * rate_Hz, tick_rate_Hz):
         raise ArgumentError(
             f"the rate must divide the device's {tick_rate_Hz:g} Hz, got {rate_Hz:g} Hz",
-            hint="use 1000, 2000 or 5000 Hz",
+            hint=f"use {tick_rate_Hz:g} Hz or a whole fraction of it, such as "
+            f"{', '.join(f'{tick_rate_Hz / part:g}' for part in (2, 4, 5, 10))} Hz",
         )
     return decimation
 

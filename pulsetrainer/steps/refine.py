@@ -15,7 +15,8 @@ from pulsetrainer.device.limits import Limits, Rehearsal, check_force, check_pea
 from pulsetrainer.errors import ArgumentError, DataError, Interrupted
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
-from pulsetrainer.steps.play import Plan, check_drive, play_once
+from pulsetrainer.steps.own_device import check_units
+from pulsetrainer.steps.play import Plan, play_once
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -174,7 +175,7 @@ def check(drive: Waveform, passes: int) -> Model:
     """Return the model of a drive; refuse what ``refine`` cannot take, before any device is opened."""
     if passes < 1:
         raise ArgumentError(f"passes must be at least 1, got {passes}", hint="5 is usual")
-    check_drive(drive)
+    check_units(drive)
     if drive.model is None:
         raise DataError(
             f"the drive {drive.name} does not say what model it was made with",

@@ -21,7 +21,7 @@ from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 from pulsetrainer.steps.loop_gains import MOST_PROPORTIONAL, OPEN_LOOP, from_wire, to_wire
 from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement, Step, check_range, planned, rest_of
-from pulsetrainer.steps.play import check_drive
+from pulsetrainer.steps.own_device import check_units
 from pulsetrainer.steps.progress import Progress, silent
 
 _DIODE_V = (0.15, 2.0)  # what any diode drops
@@ -122,7 +122,7 @@ def _check(pulses: Sequence[Shape | Waveform], supply_V: float | None, limit_A: 
     check_range(limit_A)
     for pulse in pulses:
         if isinstance(pulse, Waveform):
-            check_drive(pulse)
+            check_units(pulse)
             check_peak(pulse.compensated, limit_A)
 
 

@@ -27,6 +27,7 @@ def small_chain(made_once) -> Path:
     """A folder with a small run, a model, a drive and a playback; copied before anything is written there."""
 
     def fill(folder: Path) -> None:
+        (folder / "plain").mkdir()
         for words in PREPARATION:
             done = pulsetrainer(folder, *words)
             assert done.code == 0, done

@@ -18,7 +18,7 @@ import pytest
 import pulsetrainer as pt
 from command_lines import EXCITATION
 from program import PROGRAM, Ran, pulsetrainer, until_recorded
-from wording import refusal
+from wording import refusal, tells
 
 MODEL = ("--model", "model.h5", "-o", "x.h5")
 OUT = ("-o", "x.h5")
@@ -405,6 +405,11 @@ def test_what_is_hardly_felt_or_never_moves_is_told(ready):
     (ready / "share.csv").write_text("t_s,amplitude\n1,0.8\n")
     words = ("session", "--model", "model.h5", "-o", "x.h5", "--beats", "2", "--changes", "share.csv")
     assert "an amplitude of 0.8 % is hardly felt" in pulsetrainer(ready, *words, "--dry-run").err
+    (ready / "late.csv").write_text("t_s,rate\n400,90\n")
+    words = ("session", "--model", "model.h5", "-o", "x.h5", "--minutes", "0.1", "--changes", "late.csv")
+    said = pulsetrainer(ready, *words, "--ectopic", "0.1", "--variability", "0.04", "--dry-run").err
+    tells(said, "a share in the place of %")
+    tells(said, "changes after the end")
     (ready / "still.csv").write_text("t_s,current_A,force_N\n0,0,1\n1,1,1\n2,0.5,1\n")
     words = ("import", "still.csv", "--input", "current_A", "--output", "force_N", "-o", "still.h5")
     assert "the output of still.csv never moves: it is 1 N throughout" in pulsetrainer(ready, *words).err

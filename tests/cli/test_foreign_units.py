@@ -93,3 +93,9 @@ def test_a_model_of_another_kind_of_device_is_named(tmp_path):
     test_a_model_in_other_units_is_inverted(tmp_path, "piezo")
     for words in (("check", "model.h5"), ("session", "--model", "model.h5", "-o", "session.h5")):
         refusal(pulsetrainer(tmp_path, *words), 3, "another kind of device", file="model.h5")
+
+
+def test_a_model_without_units_is_told_apart_from_one_of_another_device(small_chain):
+    """Its table is imported again, with its units."""
+    done = pulsetrainer(small_chain, "evaluate", "run.h5", "--model", "plain/model.h5")
+    refusal(done, 3, "no units", file="plain/model.h5")

@@ -16,7 +16,8 @@ import pulsetrainer as pt
 from pulsetrainer.errors import DataError, PulsetrainerError
 from pulsetrainer.report.planned import to_be_played
 from pulsetrainer.report.results import inverted
-from pulsetrainer.steps.play import ErrorsSoFar, check_drive, plan
+from pulsetrainer.steps.own_device import check_units
+from pulsetrainer.steps.play import ErrorsSoFar, plan
 
 KEPT = Path(__file__).parents[1] / "data" / "files-0.1"
 
@@ -58,7 +59,7 @@ def test_a_small_pulse_is_told_with_the_strokes_before_it():
 def test_a_drive_of_another_device_is_not_played(units):
     """Nor refined: 9 mT were pressed as 9 N."""
     drive = replace(examples.waveform(400), input_unit=units[0], output_unit=units[1])
-    for verb in (partial(plan, repeats=1), check_drive):
+    for verb in (partial(plan, repeats=1), check_units):
         with pytest.raises(DataError, match=f"takes {units[0]} and gives {units[1]}"):
             verb(drive)
 
