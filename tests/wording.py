@@ -48,6 +48,7 @@ MESSAGES = {
     "two outputs": Message("named for two outputs", "another file", "{file}"),
     "a folder": Message("is a folder", "", "{file}", "expected a file"),
     "exists": Message("already exists", "another file, such as", "{file}"),
+    "table exists": Message("--data writes its table", "another figure, such as", "{file}"),
     "truncated": Message("truncated", "restore it", "{file}", got="{bytes} bytes"),
     "not HDF5": Message("not an HDF5 file", "pulsetrainer import", "{file}"),
     "another program's": Message("another program", "pulsetrainer import", "{file}", "kind"),

@@ -319,6 +319,7 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
 
 def test_a_hint_names_the_files_that_were_given(ready):
     """None that stands for one, where the command line names it or there is but one of its kind."""
+    shutil.rmtree(ready / "plain")
     for path in ready.iterdir():
         if path.name != "run.h5":
             path.unlink()

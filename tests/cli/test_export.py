@@ -74,7 +74,7 @@ def test_a_figure_with_its_data(tmp_path, name):
     refusal(
         pulsetrainer(tmp_path, "plot", file, "-o", "figure.png", "--data", "--json"),
         2,
-        "exists",
+        "table exists",
         file="figure.csv",
     )
     assert not (tmp_path / "figure.png").exists()
