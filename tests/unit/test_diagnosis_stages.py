@@ -2537,6 +2537,24 @@ def test_of_two_as_good_the_simpler_is_tried_first(monkeypatch, apart, first):
     assert [score.cause.id for _, score in found.trials] == [first, *rest]
 
 
+@pytest.mark.parametrize(
+    ("best", "other", "apart", "first"),
+    [
+        ("input-lag", "viscous", 9.9, "viscous"),
+        ("input-lag", "viscous", 10.1, "input-lag"),
+        ("viscous", "input-lag", 9.9, "viscous"),  # of fewer parameters, but rare
+    ],
+)
+def test_what_devices_do_comes_before_a_recorder_that_is_late(monkeypatch, best, other, apart, first):
+    """A force by speed looks like an input that is recorded late."""
+    squares = {frozenset({best}): 50.0, frozenset({other}): 50.0 + apart}
+    _refitting(monkeypatch, joint_fit, squares=squares)
+    monkeypatch.setattr(joint_fit, "doubt", lambda best, trial, noise: 10.0)
+    scores = Screen(tuple(_score(name, 100.0) for name in (best, other)))
+    found = joint_fit.stage(_state(_fit(500.0), scores=scores))
+    assert found.trials[0][1].cause.id == first
+
+
 @pytest.mark.parametrize(("lacks", "others"), [((), set()), (("rates",), {"lag"})])
 def test_at_one_rate_all_that_widen_the_loop_are_one_family(lacks, others):
     """A viscous force and a lag against it fit anything there, and mislead at other rates."""

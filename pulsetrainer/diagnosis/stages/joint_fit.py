@@ -39,8 +39,8 @@ def stage(state: State) -> State:
     trials += _as_late(state, trials)
     trials.sort(key=lambda pair: pair[0].squares)
     if trials:
-        best = trials[0][0]
-        trials.sort(key=lambda pair: not _simpler(state, best, pair[0]))  # stable: else by their squares
+        best = trials[0]
+        trials.sort(key=lambda pair: not _simpler(state, best, pair))  # stable: else by their squares
     return replace(state, trials=tuple(trials))
 
 
@@ -73,10 +73,15 @@ def _with(state: State, cause: Cause, values: Values) -> Fitted:
     return refit(state.problem, terms, state.current, rounds=LIMITS.trial_rounds)
 
 
-def _simpler(state: State, best: Fitted, trial: Fitted) -> bool:
-    """Whether a trial has fewer parameters than the best one, and fits as well, within the doubt."""
+def _simpler(state: State, first: tuple[Fitted, Score], other: tuple[Fitted, Score]) -> bool:
+    """Whether a trial has fewer parameters than the best one, and fits as well, within the doubt.
+
+    A force by speed looks like an input that is recorded late. Devices have forces; few recorders are late.
+    """
+    (best, score), (trial, its) = first, other
     known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))
-    return own < known and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
+    usual = score.cause.comes_before if score.cause.comes_before != its.cause.comes_before else own < known
+    return usual and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
 
 
 def promising(state: State, score: Score) -> bool:
