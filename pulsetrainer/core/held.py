@@ -59,16 +59,18 @@ def _readings(values: FloatArray) -> BoolArray | None:
     coarse = float(np.median(changes)) <= _COARSE * float(distinct.min())
     if usual < 2.0 or np.mean(regular) < _REGULAR or coarse:
         return None
-    # one reading may be equal to the next, as at a rest: it was read all the same
-    rows, readings = (
-        np.append(rows, values.size - at[-1]),
-        np.append(readings, (values.size - at[-1]) // usual),
-    )
-    readings = np.maximum(readings, 1.0).astype(np.int64)
-    of_run = np.repeat(np.arange(at.size), readings)
-    number = np.arange(of_run.size) - np.repeat(np.cumsum(readings) - readings, readings)
-    new[at[of_run] + np.rint(number * (rows / readings)[of_run]).astype(np.int64)] = True
+    new[_also_read(np.append(at, values.size), usual)] = True
     return new
+
+
+def _also_read(at: IntArray, usual: float) -> IntArray:
+    """Return the rows that were read, of changes and the end at (k + 1,): one reading may equal the next."""
+    rows = np.diff(at)
+    readings = np.maximum(np.rint(rows / usual), 1.0).astype(np.int64)
+    readings[-1] = max(int(rows[-1] // usual), 1)  # the last one may not have stood for long
+    of_run = np.repeat(np.arange(rows.size), readings)
+    number = np.arange(of_run.size) - np.repeat(np.cumsum(readings) - readings, readings)
+    return at[of_run] + np.rint(number * (rows / readings)[of_run]).astype(np.int64)
 
 
 def _moves(other: FloatArray, new: BoolArray) -> FloatArray:

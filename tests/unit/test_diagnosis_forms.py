@@ -30,9 +30,7 @@ KINDS = {  # of device: how it is drawn, and the form that describes it
 }
 SLOW = pytest.mark.slow  # one of the other forms is quick
 FORMS = ["clockwise", *(pytest.param(name, marks=SLOW) for name in ("butterfly", "mixed"))]
-# of creep such records show half a per cent, or by the draw of the noise a little more
-NOTHING = {"none", "inconclusive"}
-NAMED = {"lag": {"output-lag"}, "creep": {"creep"}, "hum": {"periodic"}, "nothing": NOTHING}
+NAMED = {"lag": {"output-lag"}, "creep": {"creep"}, "hum": {"periodic"}, "nothing": {"none"}}
 
 
 def path(points, ranges_per_s):
@@ -161,8 +159,17 @@ def test_a_creeping_butterfly_is_diagnosed_and_extended():
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", [310, 311])
 def test_what_is_planted_is_named(kind, effect, seed):
-    """Two devices of each kind with each effect; no control has a cause."""
-    assert Case(kind, effect, seed).found.verdict in NAMED[effect]
+    """Two devices of each kind with each effect; no control has a cause.
+
+    Of creep one control shows 0.53 % of the span, where 0.5 is asked for: it is inconclusive for that alone.
+    """
+    found = Case(kind, effect, seed).found
+    if (kind, effect, seed) == ("butterfly", "nothing", 310) and found.verdict != "none":
+        (creep,) = (one for one in found.causes if one.cause == "creep")
+        assert (found.verdict, found.found) == ("inconclusive", ())
+        assert 0.5 < creep.detectable_from_percent < 0.55
+    else:
+        assert found.verdict in NAMED[effect]
 
 
 @pytest.mark.parametrize("polarity", [1, -1])

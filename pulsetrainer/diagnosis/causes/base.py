@@ -317,13 +317,10 @@ class Cause:
         return []
 
 
-class Late(Cause):
-    """A cause by which something is late, with one time constant or delay."""
+class OneTime(Cause):
+    """A cause with one time constant or delay, before or after the output."""
 
     family = "lag"
-    scales = True
-    widens = True
-    common = True
     _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
@@ -334,23 +331,22 @@ class Late(Cause):
         return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
 
 
-class RecordedLate(Cause):
-    """A fault by which the input is recorded late, with one time: no device answers before it is asked."""
+class Late(OneTime):
+    """A cause by which the output is late."""
 
-    family = "lag"
+    scales = True
+    widens = True
+    common = True
+
+
+class RecordedLate(OneTime):
+    """A fault by which the input is recorded late: no device answers before it is asked."""
+
     lasting = False
     corrects = True
     comes_before = True
     excitation = "reversals at three rates or more, spanning ten to one, with stops"
     source = "Ljung, System Identification, 1999, section 14.1"
-    _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)
-
-    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        return sampled(self.parameters, frame)
-
-    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try, none shorter than a time step."""
-        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
 
     def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether it is late by more than the moments of sampling may be."""
