@@ -85,6 +85,7 @@ LIBRARY = {
     "clock-skew": lambda r, s: ({}, {"skew": s * _sign(r) * _log(r, 3e-5, 2.5e-4)}),
     "late-input": lambda r, s: ({}, {"delay": s * _log(r, 0.0016, 0.012) + FILTER_S}),
     "input-lag": lambda r, s: ({}, {"tau": s * _log(r, 0.0018, 0.016) + FILTER_S}),
+    "gain-drift": lambda r, s: ({}, {"gain": s * _sign(r) * _log(r, 0.0003, 0.0015)}),
     "condition-change": lambda r, s: (
         {},
         {"offset": s * _sign(r) * _log(r, 0.1, 0.4), "gain": s * _sign(r) * _log(r, 0.01, 0.04)},
@@ -105,7 +106,8 @@ SETTINGS = ("seed", "noise-seed", "noise")
 OUTSIDE = ("gain wander", "hidden load", "bursts")
 FAMILIES = (
     {"delay", "field-lag", "output-lag", "rate-widening", "viscous", "late-input", "input-lag"},
-    {"offset-drift", "step"},
+    {"offset-drift", "step", "gain-drift"},
+    {"thermal-drift", "gain-drift"},
     {"creep", "accommodation", "leak"},
 )
 # Not in pairs: an amplifier behind all that the bench measures, a second record, effects that take data
@@ -278,6 +280,8 @@ def _spoilt(case: Case, record: Record) -> Record:
         if "quantisation" in case.causes:  # the other clock's converter has the same steps
             step = case.truth["quantisation"]["size"]
             y = np.round(y / step) * step
+    if "gain-drift" in case.causes:  # of the sensor, which knows no output of an empty memory
+        y = y * (1.0 + case.truth["gain-drift"]["gain"] * t)
     if "leak" in case.causes:  # z' = y' - k z, for an output that is straight between samples
         left = np.exp(-case.truth["leak"]["rate"] * DT_S)
         into = (1.0 - left) / (case.truth["leak"]["rate"] * DT_S)

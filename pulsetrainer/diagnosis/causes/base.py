@@ -222,6 +222,11 @@ class Cause:
         """The same without the last parameter of the finer one; None: this is no finer one."""
         return None
 
+    def holds(self, other: Cause) -> bool:
+        """Whether its formula is that of another cause, with one parameter more."""
+        coarser = self.coarser()
+        return coarser is not None and coarser.id == other.id != self.id
+
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         return self.parameters

@@ -43,28 +43,39 @@ def stage(state: State) -> State:
 def _refined(state: State, term: Term) -> State:
     """Return the state with the finer formula of a cause if the records show it, else the plain one."""
     current, problem = state.current, state.problem
-    coarser, finer = term.cause.coarser(), term.cause.finer(problem.frames[0])
-    if coarser is None and not finer:
-        return state
-    others = [one for one in current.terms if one.cause is not term.cause]
-    if coarser is None:
-        plain = current
-        begun = [(*others, Term(cause, (*term.values, value))) for cause, value in finer]
-        fine = min((refit(problem, terms, current) for terms in begun), key=lambda fitted: fitted.squares)
-    else:
-        plain, fine = refit(problem, (*others, Term(coarser, term.values[:-1])), current), current
-    best = fine if _shows(state, fine, plain, term.cause.id) else plain
-    return state if best is current else replace(state, current=settled(problem, best))
+    old, coarser = term.cause, term.cause.coarser()
+    others = [one for one in current.terms if one is not term]
+    plain, trials = current, []
+    if coarser is not None:
+        term = Term(coarser, term.values[:-1])
+        plain, trials = refit(problem, (*others, term), current), [current]
+    if coarser is None or coarser.id != old.id:
+        begun = [Term(one, (*term.values, value)) for one, value in term.cause.finer(problem.frames[0])]
+        trials += [refit(problem, (*others, one), current) for one in begun]
+    shown = [fine for fine in trials if _shows(state, fine, plain, _in_place_of(old, fine, current))]
+    best = min(shown, key=lambda fitted: fitted.squares, default=plain)
+    return state if best is current else _with(state, best, old)
 
 
-def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
+def _in_place_of(old: Cause, fitted: Fitted, current: Fitted) -> Cause:
+    """Return the cause of a fit that has the place of an old one."""
+    return next(t.cause for t in fitted.terms if t.cause.id == old.id or t.cause.id not in current.names)
+
+
+def _shows(state: State, fine: Fitted, plain: Fitted, cause: Cause) -> bool:
     """Whether the records show a finer formula, and the intervals of its strengths exclude zero."""
     noise = state.scores.noise
     if noise is None or plain.squares - fine.squares <= LIMITS.finer * doubt(fine, plain, noise):
         return False
-    known = estimates_of(fine, state.scores, state.held_out, state.floor)[name]
-    (cause,) = (one.cause for one in fine.terms if one.cause.id == name)
+    known = estimates_of(fine, state.scores, state.held_out, state.floor)[cause.id]
     return not may_be_nothing(cause.strengths_of(known))
+
+
+def _with(state: State, best: Fitted, old: Cause) -> State:
+    """Return the state with a fit that has another cause in the place of an old one, with its p-value."""
+    new = _in_place_of(old, best, state.current).id
+    p_values = {new if name == old.id else name: p for name, p in state.p_values.items()}
+    return replace(state, current=settled(state.problem, best), p_values=p_values)
 
 
 def _one_creep(state: State) -> State:
@@ -103,8 +114,4 @@ def _exchanged(state: State, cause: Cause) -> State:
         if current.squares - trial.squares > doubt(current, trial, state.scores.noise):
             trials.append(trial)
     best = min((current, *trials), key=lambda fitted: fitted.squares)
-    if best is current:
-        return state
-    (new,) = set(best.names) - set(without.names)
-    p_values = {new if name == cause.id else name: p for name, p in state.p_values.items()}
-    return replace(state, current=settled(problem, best), p_values=p_values)
+    return state if best is current else _with(state, best, cause)

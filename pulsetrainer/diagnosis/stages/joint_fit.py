@@ -76,11 +76,12 @@ def _with(state: State, cause: Cause, values: Values) -> Fitted:
 def _simpler(state: State, first: tuple[Fitted, Score], other: tuple[Fitted, Score]) -> bool:
     """Whether a trial has fewer parameters than the best one, and fits as well, within the doubt.
 
-    A force by speed looks like an input that is recorded late. Devices have forces; few recorders are late.
+    A formula that holds another has more of its own than that one, in each of its kinds. A force by speed looks like an input that is recorded late. Devices have forces; few recorders are late.
     """
     (best, score), (trial, its) = first, other
     known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))
-    usual = score.cause.comes_before if score.cause.comes_before != its.cause.comes_before else own < known
+    fewer = own < known or score.cause.holds(its.cause)
+    usual = score.cause.comes_before if score.cause.comes_before != its.cause.comes_before else fewer
     return usual and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
 
 

@@ -236,6 +236,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     )
     found = []
     others = [score for score in ranked(without, fitted) if score.cause.id not in fitted.names]
+    others = [score for score in others if not score.cause.holds(term.cause)]  # that would fit anyway
     close = [score for score in others[: LIMITS.closest] if score.gain >= LIMITS.rival_screened * gain]
     # linearised from afar, a lag of another kind may score nothing
     close += [score for score in others if both_late(score, term) and score not in close]
