@@ -26,7 +26,8 @@ def correct(
 ) -> Run:
     """Take out of a run those faults of the measurement that a diagnosis of it found.
 
-        y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d), y(t - d)
+        y <- y - b - g (y - y0), y - b t, y0 + (y - y0) / (1 + g t), y - A sin(2 pi f t + phi),
+             y(t / (1 + e)), y(t + d), y(t - d)
         u <- u + tau u'
 
     Samples that cannot be restored (wild, far beyond a rail, beside a step) are interpolated between their

@@ -44,6 +44,7 @@ OF_THE_MEASUREMENT = (
     "frozen",
     "late-input",
     "input-lag",
+    "gain-drift",
 )
 # two records, or no effect on the device
 NOT_JUDGED = ("condition-change", "current-tracking", "out-of-range", "clipped-input")

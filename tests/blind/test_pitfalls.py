@@ -197,6 +197,23 @@ def test_a_drift_has_either_direction(size):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("size", [0.08, -0.08])
+def test_a_gain_that_drifts_is_no_drift_of_the_zero(size):
+    """Upwards it was unknown, downwards a heat that cools nothing."""
+    seen, unseen = _runs_of_plays(lambda u, static, t, number: static * (1.0 + size * t / t[-1]))
+    calm, unseen = _runs_of_plays(lambda u, static, t, number: static)
+    model = pt.identify(seen)
+    found = pt.diagnose([seen], model)
+    assert ([one.cause for one in found.found], found.correctable) == (["gain-drift"], ("gain-drift",))
+    known = {one.name: one.value for one in found.found[0].parameters}
+    assert known["gain"] == pytest.approx(size / seen.time_s[-1], rel=0.05)
+    models = [model, pt.identify(pt.correct(seen, found)), pt.identify(calm)]
+    drifting, corrected, sound = (one.rms_percent for one in pt.evaluate(unseen, models).models)
+    assert 2.0 * sound < drifting
+    assert corrected < sound + 0.2 * (drifting - sound)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["late-input", "input-lag"])
 def test_an_input_that_was_recorded_late_is_no_property_of_the_device(name):
     """A slow sensor of the input, or one that is read later, was a clock that runs at another rate."""

@@ -30,6 +30,7 @@ VOCABULARY = (
     *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
     *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
     *("accommodation", "unlisted", "clipped-input", "leak", "frozen", "late-input", "input-lag"),
+    "gain-drift",
 )
 # values that matter, and the values at which a cause does nothing
 STRENGTHS = {
@@ -41,6 +42,7 @@ STRENGTHS = {
     "creep": ((0.05, 1.0), (0.0, 1.0)),
     "thermal-drift": ((0.02, 5.0), (0.0, 5.0)),
     "offset-drift": ((0.01, 0.002, 0.0005), (0.0, 0.0, 0.0)),
+    "gain-drift": ((0.01, 0.002, 0.003), (0.0, 0.0, 0.0)),
     "periodic": ((0.1, 0.1, 7.0), (0.0, 0.0, 7.0)),
     "step": ((0.1, 0.02, 1.0), (0.0, 0.0, 1.0)),
     "clock-skew": ((1e-3,), (0.0,)),

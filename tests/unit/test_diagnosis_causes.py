@@ -53,6 +53,26 @@ def test_lags_follow_a_ramp():
     assert low_pass(T, 2e-9, DT) is not T
 
 
+def test_a_gain_drifts_evenly_about_empty_memory():
+    """Beside a drift of the zero; what is left of the gain is never below a tenth."""
+    y, zero = np.sin(T), 0.25
+    shown = _shown("gain-drift", y, 2.0, -3.0, 0.5, zero=zero)
+    np.testing.assert_allclose(shown, y + 2.0 * T - 3.0 * T * (T - T[-1]) + 0.5 * T * (y - zero), atol=1e-12)
+    gain = CAUSE["gain-drift"].quantities(_frame())[-1]
+    assert (gain.low, gain.high) == pytest.approx((-0.9 / 4.0, 0.9 / 4.0))
+
+
+def test_a_formula_that_holds_another_is_nothing_without_its_own_part():
+    """A drift of the gain holds one of the zero, in its kinds too; kinds of one cause hold no other."""
+    gain, zero = CAUSE["gain-drift"], CAUSE["offset-drift"]
+    assert gain.holds(zero)
+    assert gain.holds(zero.relaxing)
+    assert not any(zero.relaxing.holds(one) or zero.holds(one) for one in (zero, gain))
+    known = [Estimate(name, 0.1, "", 0.05, 0.2) for name in ("rate", "bend", "gain")]
+    assert not may_be_nothing(gain.strengths_of(known))
+    assert may_be_nothing(gain.strengths_of([*known[:2], replace(known[2], lower=-0.1)]))
+
+
 def test_creep_is_the_mean_of_three_lags():
     """A third each of tau / 4, tau and 4 tau; the other formula has half in the middle."""
     a, tau = 0.2, 0.4

@@ -802,6 +802,7 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
         ("accommodation", [(0.05, 28.0), (0.05, 80.0), (0.05, 240.0)]),
         ("load-dependence", [(0.01 * 4.0 / 8.0,)]),
         ("offset-drift", [(0.01 * 8.0 / 10.0, 0.0), (0.0, 4.0 * 0.01 * 8.0 / 10.0**2)]),
+        ("gain-drift", [(0.008, 0.0, 0.0), (0.0, 0.0032, 0.0), (0.0, 0.0, 0.001)]),
         ("clock-skew", [(1e-5,), (1e-4,)]),
     ],
 )

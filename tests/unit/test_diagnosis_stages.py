@@ -329,6 +329,17 @@ def test_a_refit_that_lowers_nothing_leaves_its_turn_to_the_next(monkeypatch):
     assert len(found.trials) == 6
 
 
+@pytest.mark.parametrize(("doubt", "first"), [(9.0, "gain-drift"), (11.0, "offset-drift")])
+def test_a_formula_comes_before_one_that_holds_it(monkeypatch, doubt, first):
+    """Within the doubt, though it relaxes, and so has as many parameters."""
+    squares = {frozenset({"gain-drift"}): 400.0, frozenset({"offset-drift"}): 410.0}
+    _refitting(monkeypatch, joint_fit, squares=squares)
+    monkeypatch.setattr(joint_fit, "doubt", lambda *_: doubt)
+    relaxes = replace(_score("offset-drift", 90.0), cause=CAUSE["offset-drift"].relaxing)
+    found = joint_fit.stage(_state(_fit(500.0), scores=Screen((_score("gain-drift", 100.0), relaxes))))
+    assert found.trials[0][1].cause.id == first
+
+
 def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
     """Scores are sorted: none behind it can be."""
     _refitting(monkeypatch, joint_fit, squares={frozenset({"creep"}): 1.0})
@@ -549,6 +560,34 @@ def test_a_finer_formula_that_was_searched_for_gives_way_to_the_plain_one(monkey
     fine = Fit(400.0, (Term(relaxing, (0.1, 0.2, 3.0)),))
     after = exchange.stage(_state(fine, scores=Screen(noise=1.0)))
     assert [len(term.values) for term in after.current.terms] == [told]
+
+
+@pytest.mark.parametrize(
+    ("zero", "relaxing", "told"),
+    [(419.0, 500.0, "offset-drift"), (421.0, 500.0, "gain-drift"), (425.0, 404.0, "gain-drift"),
+     (425.0, 399.0, "offset-drift")],
+)  # fmt: skip
+def test_a_drift_of_the_gain_gives_way_to_one_of_the_zero(monkeypatch, zero, relaxing, told):
+    """Where noise can make the difference, and to one that relaxes where that fits better; its p stays."""
+    names = ("rate", "bend", "slowing", "gain")
+    known = tuple(Estimate(name, 0.1, "", 0.05, 0.2) for name in names)
+    estimates = {"offset-drift": known[:3], "gain-drift": (*known[:2], known[3])}
+    monkeypatch.setattr(exchange, "estimates_of", lambda *_: estimates)
+
+    def refit(problem, terms, *_, **__):
+        (term,) = terms
+        own = {"gain-drift": 400.0}.get(term.cause.id, zero if len(term.values) == 2 else relaxing)
+        return Fit(own, tuple(terms))
+
+    for module in (exchange, acceptance):
+        monkeypatch.setattr(module, "refit", refit)
+    monkeypatch.setattr(exchange, "doubt", lambda finer, plain, noise: 10.0)
+    monkeypatch.setattr(exchange, "ranked", lambda fitted, whole: ())
+    _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
+    begun = Fit(400.0, (Term(CAUSE["gain-drift"], (0.1, 0.2, 0.03)),))
+    after = exchange.stage(_state(begun, scores=Screen(noise=1.0), p_values={"gain-drift": 0.006}))
+    assert (after.current.names, dict(after.p_values)) == ((told,), {told: 0.006})
+    assert len(after.current.terms[0].values) == (2 if told == "offset-drift" and relaxing == 500.0 else 3)
 
 
 def test_a_cause_is_exchanged_for_a_better_kind_of_its_own(monkeypatch):
@@ -1044,6 +1083,12 @@ def test_a_rival_of_a_large_gain_may_be_a_little_worse(monkeypatch):
         monkeypatch.setattr(rivals, "ranked", lambda *_fits: (_score("delay", 6000.0),))
         state = _state(_fit(1.0, "field-lag"), without={"field-lag": _fit(10_001.0)})
         assert rivals.rivals(state, state.current.terms[0]) == found
+
+
+def test_a_formula_that_holds_the_cause_found_is_no_rival(monkeypatch):
+    """It would fit as well whatever was found; the other way round it is one."""
+    assert _rivals(monkeypatch, 400.0, scores=("gain-drift",), name="offset-drift")[0] == ()
+    assert _rivals(monkeypatch, 400.0, scores=("offset-drift",), name="gain-drift")[0] == ("offset-drift",)
 
 
 @pytest.mark.parametrize(("creep", "found"), [(549.0, ("creep",)), (551.0, ())])

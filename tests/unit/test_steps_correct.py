@@ -70,6 +70,8 @@ def _added(name, y, t):
         lost = 1.0 - np.exp(-0.4 * t)  # half of it, and a quarter of the square of the length, in the middle
         bend = -2.0 * (1.0 - np.exp(-0.2 * t[-1])) ** 2 / t[-1] ** 2
         return y + lost + 0.02 * t, {"rate": 0.02 + lost[-1] / t[-1], "bend": bend, "slowing": 0.4}
+    if name == "gain-drift":  # of 4 % in ten seconds, about an output of 0.5
+        return y + 0.004 * t * (y - 0.5), {"rate": -0.002, "bend": 0.0, "gain": 0.004}
     if name == "step":
         return np.where(t > 12, 0.4 + 1.03 * y, y), {"offset": 0.4, "gain": 0.03, "time": 12.0}
     if name == "periodic":
@@ -93,7 +95,7 @@ def test_where_no_input_is_never_reached_a_leak_keeps_its_first_sample(clean):
         np.testing.assert_allclose(done.output, clean.output + off, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["offset-drift", "step", "periodic", "clock-skew", "leak"])
+@pytest.mark.parametrize("name", ["offset-drift", "gain-drift", "step", "periodic", "clock-skew", "leak"])
 @pytest.mark.parametrize("polarity", [1, -1])
 def test_what_was_added_is_taken_out(clean, name, polarity):
     """To the last digits where it was added, to what noise interpolates where time was stretched."""

@@ -8,7 +8,8 @@ For a lag or a force by speed that is as fast as the samples a creep is tried as
 lags, and one creep in the place of several fast causes (decision 128).
 
 Some causes have a finer formula with one more parameter. It takes the place of the plain one only if the fits
-differ by more than twice what noise, and what happens between two samples, can make.
+differ by more than twice what noise, and what happens between two samples, can make. The finer formula may be
+another cause: a drift of the gain holds one of the zero.
 """
 
 from __future__ import annotations

@@ -10,7 +10,8 @@ A candidate must be significant, and its linearised score at least half of what 
 shows less than a refit does. A *family* is a group of causes that look alike, such as the lags. No candidate
 is tried if its family is in the model already: what a cause leaves that looks like its family is due to its
 imperfect formula, not to a second cause. The best fit comes first. But a fit with fewer parameters comes
-before it, if noise or what happens between two samples could make the difference.
+before it, if noise or what happens between two samples could make the difference. So does a drift of the zero
+before one of the gain, whose formula holds it.
 """
 
 from __future__ import annotations
@@ -76,7 +77,8 @@ def _with(state: State, cause: Cause, values: Values) -> Fitted:
 def _simpler(state: State, first: tuple[Fitted, Score], other: tuple[Fitted, Score]) -> bool:
     """Whether a trial has fewer parameters than the best one, and fits as well, within the doubt.
 
-    A formula that holds another has more of its own than that one, in each of its kinds. A force by speed looks like an input that is recorded late. Devices have forces; few recorders are late.
+    A formula that holds another counts as the larger one, whichever kind of the other it is. A force by
+    speed looks like an input that is recorded late. Devices have forces; few recorders are late.
     """
     (best, score), (trial, its) = first, other
     known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))

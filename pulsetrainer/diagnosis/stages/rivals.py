@@ -2,7 +2,8 @@
 
 A name is unique only if no other cause fits as well in its place. The three causes that score best without it
 are fitted jointly, each in its place. A rival is named beside the cause found if noise, or what happens
-between two samples, could make the difference between the two fits. On a record of one single rate all causes
+between two samples, could make the difference between the two fits. A cause whose formula holds that of the
+one found is no rival: it would fit anyway. On a record of one single rate all causes
 that widen the loop with the rate are named together: there they are just a wider loop. A creep and a lag as
 quick as the samples are tried in each other's place, whatever they score. Causes that equal loops showed have
 no rivals here: nothing else that is known makes equal loops differ.
