@@ -60,7 +60,7 @@ def capture(
     from pulsetrainer.artefacts import Run
     from pulsetrainer.artefacts.units import counted
     from pulsetrainer.core.course import Course
-    from pulsetrainer.steps.capture import excitation, plan
+    from pulsetrainer.steps.capture import excitation, plan, remarks
     from pulsetrainer.steps.recording import samples_played
 
     played = excitation(
@@ -72,8 +72,8 @@ def capture(
     )
     if table is not None:
         job.uses(table)
-    job.notes([played.note] if played.note else [])
-    job.notes(_of_options(context, signal, float(played.value.max()), own=table is None))
+    told = _of_options(context, signal, float(played.value.max()), own=table is None)
+    job.notes([*([played.note] if played.note else []), *told, *remarks(played, levels)])
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
         from pulsetrainer.files.resume import earlier_of
@@ -137,9 +137,4 @@ def _of_options(context: Context, signal: str, top_A: float, *, own: bool) -> li
             )
         but = " but for the count of cells" * (name == "levels")
         told.append(f"{option} does not count here{but}: the signal {signal} has its own")
-    step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
-    if by_us and step_A > level_A:
-        far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
-        far += f", {step_A / level_A:.0f} at a time, which a model will miss" * (step_A > 2 * level_A)
-        told.append(f"{far}: lower --speed, or raise --rate")
     return told

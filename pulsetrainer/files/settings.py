@@ -8,7 +8,7 @@ else the one in the user's own configuration folder; files are not mixed.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,8 @@ from pulsetrainer.errors import UsageError
 from pulsetrainer.files.input_file import permit
 
 FILE_NAME = "pulsetrainer.toml"
-VARIABLE = "PULSETRAINER_SETTINGS"
+_OURS = "PULSETRAINER_"  # what all our variables begin with
+VARIABLE = f"{_OURS}SETTINGS"
 _TOML_LINES = {
     "settings": 'port = "/dev/ttyUSB0"',
     "bounds": '"normal.continuous.mean_error_reduction_percent" = [90, 100]',
@@ -42,7 +43,7 @@ class Setting:
 
 def variable(key: str) -> str:
     """Environment variable of a key: ``limits.current_A`` is PULSETRAINER_LIMITS_CURRENT_A."""
-    return "PULSETRAINER_" + key.upper().replace(".", "_")
+    return _OURS + key.upper().replace(".", "_")
 
 
 SETTINGS = (
@@ -60,7 +61,11 @@ SETTINGS = (
 
 
 def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
-    """Return the file of settings that counts, or None; UsageError where one is named that is not there."""
+    """Return the file of settings that counts, or None.
+
+    UsageError where one is named that is not there, or a variable of ours is no setting.
+    """
+    _check_variables(environment)
     if named is not None and not named.strip():
         raise UsageError(
             "--settings must name a file, got an empty name", hint="leave it out, or name the file"
@@ -86,6 +91,28 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
             f"you have no permission to look for settings in {places[1].parent}",
             hint="check that the variable HOME is your own folder, or name a file: --settings FILE",
         ) from error
+
+
+def _check_variables(environment: Mapping[str, str]) -> None:
+    """Refuse a misspelt variable: a force limit that is ignored presses a finger."""
+    known = {name.removeprefix(_OURS): name for name in (VARIABLE, *(one.variable for one in SETTINGS))}
+    for name in environment:
+        if name.upper().startswith(_OURS) and name not in known.values():
+            near = _nearest(name.upper().removeprefix(_OURS), known)
+            meant = (
+                f"did you mean {known[near]}?" if near else f"the variables are {', '.join(known.values())};"
+            )
+            raise UsageError(
+                f"the environment variable {name} is not a setting",
+                hint=f"{meant} take it away: unset {name}",
+            )
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is most like another; empty where none is."""
+    import difflib  # noqa: PLC0415 - needed by a mistake only
+
+    return next(iter(difflib.get_close_matches(name, known, n=1, cutoff=0.5)), "")
 
 
 def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
@@ -145,10 +172,8 @@ def leaves(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
 def _value(path: Path, key: str, value: Any) -> Any:
     known = {setting.key: setting for setting in SETTINGS}
     if key not in known:
-        import difflib  # noqa: PLC0415 - needed by a mistake only
-
-        near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        hint = f"did you mean {_in_its_table(near[0])}?" if near else f"the settings are {', '.join(known)}"
+        near = _nearest(key, known)
+        hint = f"did you mean {_in_its_table(near)}?" if near else f"the settings are {', '.join(known)}"
         table, _, name = key.rpartition(".")
         if name in known:
             hint = f"put {name} above [{table}]: all that is below that line belongs to [{table}]"

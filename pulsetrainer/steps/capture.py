@@ -31,6 +31,10 @@ from pulsetrainer.steps.recording import (
 )
 from pulsetrainer.steps.stopped import raise_if_stopped
 
+# The bench's current is off by at most 3.5 % of the range on ramps of 100 A/s, by 24 % on ramps of 200 A/s.
+COIL_FOLLOWS_A_PER_S = 100.0
+_ROUNDING = 1.0 + 1e-6
+
 
 def capture(
     signal: str | Signal,
@@ -122,6 +126,29 @@ def excitation(
         f"there is no signal {signal!r}; known signals: {', '.join(EXCITATIONS)}",
         hint="give one of them, or the samples of your own",
     )
+
+
+def remarks(signal: Signal, levels: int) -> list[str]:
+    """Return, in words, what a model will miss; ``levels`` are those of the identification signal."""
+    range_A = float(np.ptp(signal.value))
+    if range_A == 0.0:
+        return [
+            f"the current stays at {signal.value[0]:g} A: no model can be identified from such a recording"
+        ]
+    told, level_A = [], range_A / levels
+    moves = np.abs(np.diff(signal.value))
+    step_A, fastest = float(np.median(moves[moves > 0.0])), float(moves.max()) * signal.rate_Hz
+    if signal.name == "identification" and step_A > level_A * _ROUNDING:
+        far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
+        far += f", {step_A / level_A:.0f} at a time, which a model will miss" * (step_A > 2 * level_A)
+        told.append(f"{far}: lower `speed`, or raise `rate`")
+    if fastest > COIL_FOLLOWS_A_PER_S * _ROUNDING:
+        told.append(
+            f"the signal moves at up to {fastest:.3g} A/s, and a coil as delivered follows at up to "
+            f"{COIL_FOLLOWS_A_PER_S:g} A/s: the current will lag behind it. The recording holds the current "
+            "that flowed"
+        )
+    return told
 
 
 def tally_of(signal: Signal, levels: int) -> Tally:

@@ -113,6 +113,22 @@ def test_a_wrong_variable_is_named(run):
     assert "unset PULSETRAINER_LEVELS" in done.err
 
 
+@pytest.mark.parametrize(
+    ("name", "then"),
+    [
+        ("PULSETRAINER_LIMIT_FORCE_N", "did you mean PULSETRAINER_LIMITS_FORCE_N?"),
+        ("pulsetrainer_port", "did you mean PULSETRAINER_PORT?"),
+        ("PULSETRAINER_COLOUR", "the variables are PULSETRAINER_SETTINGS, PULSETRAINER_PORT"),
+    ],
+)
+def test_a_variable_that_is_no_setting_is_refused(run, name, then):
+    """A misspelt limit of the force was ignored, and the device pressed with its own."""
+    done = run(*PLAN, env={name: "8"})
+    assert done.code == 2
+    assert f"the environment variable {name} is not a setting\n  try: {then}" in done.err
+    assert f"unset {name}" in done.err
+
+
 def test_effective_values_are_in_the_provenance(run, tmp_path):
     """Those of the file too: what was in force can be read off the artefact."""
     (tmp_path / "pulsetrainer.toml").write_text(
@@ -190,6 +206,23 @@ def test_a_signal_that_skips_levels_is_told(run, speed, noted):
     done = run("capture", "identification", "--speed", speed, "--dry-run", "-o", "out.h5")
     assert done.code == 0
     assert ("past a level of 0.0312 A: lower --speed, or raise --rate" in done.err) == noted
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("0,0.5\n1,0.5\n2,0.5\n", "the current stays at 0.5 A: no model can be identified"),
+        ("0,0\n0.01,1.2\n1,0\n", "moves at up to 120 A/s, and a coil as delivered follows at up to 100"),
+        ("0,0\n0.0125,1.2\n1,0\n", ""),
+    ],
+)
+def test_a_signal_that_tells_little_is_told(run, tmp_path, table, said):
+    """Of a constant, or of what no coil follows; nothing of the others."""
+    (tmp_path / "own.csv").write_text(f"t_s,current_A\n{table}")
+    done = run("capture", "own.csv", "--dry-run", "-o", "out.h5")
+    assert done.code == 0
+    assert said in done.err
+    assert ("note:" in done.err) is bool(said)
 
 
 def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
