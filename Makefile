@@ -116,7 +116,7 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 	$(BIN)/lint-imports
 
 faults: $(VENV)/installed-test  ## kill -9, full disks, damaged files, fuzzing: hundreds of tries, one table
-	$(BIN)/python tests/faults/run.py --tries $(or $(TRIES),400) --seed $(or $(SEED),1)
+	$(BIN)/python tests/faults/run.py --tries $(or $(TRIES),560) --seed $(or $(SEED),1)
 
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s

@@ -16,7 +16,7 @@ from prandtl_ishlinskii import PrandtlIshlinskii
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.files.run_from_table import run_from_table
-from pulsetrainer.steps.evaluate import evaluate
+from pulsetrainer.steps.evaluate import _parts, evaluate
 from pulsetrainer.steps.identify import identify
 
 DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
@@ -90,7 +90,7 @@ def compare(case: Case, folder: Path) -> tuple[Model, tuple[float, ...]]:
     # the baseline follows the halves as one record; both are scored on the same samples
     lead = one.input if case.fitted == case.held_out else np.zeros(0)
     predicted = baseline(np.concatenate((lead, other.input)))[lead.size :]
-    scored = slice(known_from(other.input, low, high), None)
+    scored = np.concatenate([counts for _, counts in _parts("", other, [model])[0]])
     return model, (
         model.fit.rms_percent,
         found.shape_rms_percent,

@@ -202,6 +202,8 @@ def test_closest_match_is_that_of_the_naive_twin(drawn):
     assert np.array_equal(found.input, plane.edges[level])
     played = operator(found.input)
     assert played == pytest.approx(operator.offset + operator.polarity * reached, rel=0, abs=1e-9)
+    there = operator(found.input[-1:], found.final)[0]  # the memory it ends with
+    assert there == pytest.approx(played[-1], rel=0, abs=1e-9)
 
 
 @given(worlds(least=0.01))

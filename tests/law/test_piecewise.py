@@ -68,23 +68,31 @@ def test_a_model_played_in_pieces_is_the_whole(extension, seed, cuts):
     world=worlds(readings=("continuous",), least=0.05),
     seed=st.integers(0, 99),
     cuts=st.lists(st.integers(1, 700), max_size=5),
+    beyond=st.sampled_from([0.0, 0.05, -0.3]),
 )
-def test_a_static_inverse_in_pieces_is_the_whole(world, seed, cuts):
-    """To rounding, slew limit included, if what comes ahead is as long as the limit reaches."""
+def test_a_static_inverse_in_pieces_is_the_whole(world, seed, cuts, beyond):
+    """To rounding, slew limit included, if what comes ahead is as long as the limit reaches.
+
+    As many targets count as out of reach.
+    """
     operator = world.operator
     reach = sorted(operator.saturation)
     span = operator.plane.high - operator.plane.low
-    target = np.interp(_walk(seed, 700), (0.0, 1.5), reach)
+    target = np.interp(_walk(seed, 700), (0.2, 1.3), reach) + beyond * (reach[1] - reach[0])
     slew = 10.0 * span
-    whole = slew_limited(invert(operator, target).input, 1 / DT_S, slew)
+    exact = invert(operator, target)
+    whole = slew_limited(exact.input, 1 / DT_S, slew)
     pieces = Piecewise(Extended.of(operator, []), DT_S, slew_per_s=slew)
-    got, at = [], 0
+    got, clipped, at = [], 0, 0
     for piece in _cut(target, cuts):
         at += piece.size
-        got.append(pieces.next(piece, target[at : at + pieces.reach]).input)
+        one = pieces.next(piece, target[at : at + pieces.reach])
+        got.append(one.input)
+        clipped += one.clipped
     # the wish before the first sample is the low end: there the whole has no past, the pieces have one
     settled = slice(pieces.reach, None)
     np.testing.assert_allclose(np.concatenate(got)[settled], whole[settled], atol=1e-9 * span, rtol=0)
+    assert clipped == exact.clipped
 
 
 @settings(max_examples=settings.default.max_examples // 4)  # each is five pieces of an iteration
