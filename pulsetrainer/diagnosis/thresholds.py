@@ -124,6 +124,9 @@ class Thresholds:
 
     # Accepting a cause
     most_causes: int = 5  # at once: more were never right
+    most_steps: int = 5  # at once: more pieces would follow anything slow
+    one_step: float = 0.2  # of what is left above quick noise: one step of several takes away more
+    one_moment: float = 1.5  # distances between moments tried: nearer ones are the same step
     tried: int = 3  # candidates refitted in each round
     linearised: float = 0.5  # of the gain of a refit: a linearised score shows this much (decision 044)
     nearly: float = 0.75  # of the relevant fall: a candidate that reaches this is refitted until it converges

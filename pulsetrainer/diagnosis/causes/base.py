@@ -199,7 +199,8 @@ class Cause:
     imitates: ClassVar[bool] = False  # fits almost anything that happens while the device moves
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
     moves_zero: bool = False  # as well as the gain; then wear that looks like it may do both, too
-    sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
+    sudden: bool = False  # a change at a moment, its last parameter
+    by_pieces: bool = False  # whole pieces of the time may tell what it predicts where halves tell nothing
     line: ClassVar[bool] = False  # of the spectrum: what is like no error of a model where it is strong
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -1,15 +1,23 @@
-"""the offset or the gain changed suddenly: y + b + g (y - y0) after t0, y0 the output of empty memory."""
+"""the offset or the gain changed suddenly: y + b + g (y - y0) after t0, y0 the output of empty memory.
+
+It may have changed several times (`several_steps`): what each moment adds stays.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 from pulsetrainer.diagnosis.evidence import sentences
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.finding import Estimate
 
 _TRIED = 0.003  # of the span, and of the gain
 _MOMENTS = (0.05, 0.95, 25)  # of the record: from, to, how many; nearer to an end no loops can be compared
@@ -55,7 +63,6 @@ class Step(Cause):
         ),
         Quantity("time", "s", 0.0, 1e6, 0.01, "at which it changed, since the first sample"),
     )
-    sudden = True
     moves_zero = True
     lasting = False
     corrects = True
@@ -68,8 +75,29 @@ class Step(Cause):
             recordings hide some of the step
     """)
 
-    def __init__(self, shared: float = _SHARED) -> None:
+    def __init__(self, shared: float = _SHARED, count: int = 1) -> None:
         self._shared = shared
+        self._count = count  # of moments
+        self.sudden = count == 1  # else its last parameter says little
+        self.by_pieces = count > 1  # a half may lack what lies between two moments
+
+    def several(self, count: int) -> Cause:
+        """The same at several moments."""
+        return Step(self._shared, count)
+
+    @staticmethod
+    def each(values: Values) -> list[Values]:
+        """Offset, gain and moment of each change."""
+        return [values[k : k + 3] for k in range(0, len(values), 3)]
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return offset, gain and moment, then those of each later moment, by its number."""
+        more = [replace(q, name=f"{q.name} {k}") for k in range(2, self._count + 1) for q in self.parameters]
+        return (*self.parameters, *more)
+
+    def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
+        """Return all but the moments."""
+        return [one for k, one in enumerate(parameters) if k % 3 < self.strengths]
 
     @cached_property
     def sharp(self) -> Cause:
@@ -103,18 +131,21 @@ class Step(Cause):
         return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        after = np.clip(
-            (frame.begin_s + frame.time_s - values[2]) / (self._shared * frame.dt_s) + 0.5, 0.0, 1.0
-        )
-        return y + after * (values[0] + values[1] * (y - frame.zero))
+        shown = y
+        for offset, gain, moment in self.each(values):
+            since = (frame.begin_s + frame.time_s - moment) / (self._shared * frame.dt_s)
+            shown = shown + np.clip(since + 0.5, 0.0, 1.0) * (offset + gain * (y - frame.zero))
+        return shown
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
-        """Output (n,) as before the step; its moment is not known better than it was shared out."""
-        offset, gain, moment = values
-        since = taken.begin_s + taken.time_s - moment
-        before = (y - offset + gain * taken.empty) / (1.0 + gain)
-        unsure = np.abs(since) < 0.5 * self._shared * taken.step_s
-        return np.where(unsure, np.nan, np.where(since > 0, before, y))
+        """Output (n,) as before the first step; a moment is not known better than it was shared out."""
+        time_s, unsure = taken.begin_s + taken.time_s, np.zeros(y.size, dtype=bool)
+        offset, gain = np.zeros(y.size), np.zeros(y.size)
+        for one_offset, one_gain, moment in self.each(values):
+            offset += one_offset * (time_s > moment)
+            gain += one_gain * (time_s > moment)
+            unsure |= np.abs(time_s - moment) < 0.5 * self._shared * taken.step_s
+        return np.where(unsure, np.nan, (y - offset + gain * taken.empty) / (1.0 + gain))
 
 
 def _sides(frames: Sequence[Frame]) -> tuple[float, float]:

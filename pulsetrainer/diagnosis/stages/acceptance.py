@@ -38,10 +38,11 @@ def stage(state: State) -> State:
             trial = settled(state.problem, begun)
         if _fall(state, trial) < 1.0:
             continue
-        # halves of equal cycles are their two branches, which show nothing of a hum (decision 124)
-        gain_of = state.held_out.gain_told if score.cause.line else state.held_out.gain
-        gain = gain_of(state.current, trial, state.floor)
         (new,) = (term for term in trial.terms if term.cause.id == score.cause.id)
+        # halves of equal cycles are their two branches, which show nothing of a hum (decision 124)
+        told = score.cause.line or new.cause.by_pieces
+        gain_of = state.held_out.gain_told if told else state.held_out.gain
+        gain = gain_of(state.current, trial, state.floor)
         line = is_a_line(state, new, trial, state.current)
         if np.isfinite(gain) and gain < LIMITS.held_out_least and not line:
             continue

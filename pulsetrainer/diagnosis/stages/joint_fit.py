@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis import several_steps
 from pulsetrainer.diagnosis.causes import other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.step import Step
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.noise import doubt
@@ -38,6 +40,7 @@ def stage(state: State) -> State:
         if (len(lower) < LIMITS.tried or score.cause.line) and score.cause.family not in state.families:
             trials.append((_of_best_kind(state, score), score))
     trials += _as_late(state, trials)
+    trials += _at_several_moments(state, trials)
     trials.sort(key=lambda pair: pair[0].squares)
     if trials:
         best = trials[0]
@@ -67,6 +70,17 @@ def _as_late(state: State, trials: list[tuple[Fitted, Score]]) -> list[tuple[Fit
         for score in state.scores.scores
         if terms and both_late(score, terms[0]) and score.cause not in known and promising(state, score)
     ]
+
+
+def _at_several_moments(
+    state: State, trials: list[tuple[Fitted, Score]]
+) -> list[tuple[Fitted, Score]]:
+    """Return a refit with several steps, where a step is promising and all other trials are far worse."""
+    for score in state.scores.scores:
+        if isinstance(score.cause, Step) and promising(state, score) and score.cause.family not in state.families:
+            several = several_steps.fitted_with(state, score.cause, [trial for trial, _ in trials])
+            return [] if several is None else [(several, score)]
+    return []
 
 
 def _with(state: State, cause: Cause, values: Values) -> Fitted:
