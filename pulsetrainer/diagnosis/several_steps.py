@@ -1,12 +1,12 @@
 """Several steps: a change at several moments, sought together.
 
-One step alone explains a record with two of them badly: it, or a slow drift, then takes the place of both, and
-each correction leaves a model that is wrong in another way. So the moments are chosen one after another by
-what they leave together, from the columns of the screen, from which all is projected off that the weights can
-do (orthogonal matching pursuit: Pati et al., Asilomar Conf. Signals, 1993, equations 8 to 10). The search
-ends where one more would take away less than a fifth of what is left above the noise from sample to sample.
-Then all of them are refitted together, and those are dropped that are not needed. They are told only if they
-leave less than half of what every other candidate does: a few steps imitate much that is slow.
+One step alone explains a record with two of them badly. It, or a slow drift, takes the place of both, and
+each correction leaves a model that is wrong in another way. So the moments are chosen one after another, by
+what they leave together, from the columns of the screen, of which all is projected off that the weights can
+do (orthogonal matching pursuit: Pati, Rezaiifar and Krishnaprasad, Asilomar Conf. on Signals, 1993). The
+search ends where one more would take away less than a fifth of what is left above the noise from sample to
+sample. Then all of them are refitted together, and those are dropped that are not needed. They are told only
+if they leave less than half of what every other candidate does: a few steps imitate much that is slow.
 """
 
 from __future__ import annotations
@@ -26,22 +26,21 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def fitted_with(state: State, step: Step, others: Sequence[Fitted]) -> Fitted | None:
-    """Return the model with a change at several moments; None where other models are as good."""
+    """Return the model with a change at several moments; None where other models are nearly as good."""
     current, quick = state.current, state.floor.quick.squares
     moments = _moments(current, step, quick, state.floor.relevant)
     if len(moments) < 2:
         return None
     trial = refit(state.problem, (*current.terms, _together(step, moments)), current)
     least = min(one.squares for one in (current, *others))
-    while trial.squares - quick < LIMITS.half * (least - quick):
-        fewer = _without_the_weakest(trial, step)
-        rest = refit(state.problem, fewer, trial)
-        if rest.squares - trial.squares > max(state.floor.relevant, trial.squares - quick):
+    for _ in moments[1:]:
+        if trial.squares - quick >= LIMITS.half * (least - quick):
+            break
+        fewer = refit(state.problem, _without_the_weakest(trial, step), trial)
+        if fewer.squares - trial.squares > max(state.floor.relevant, trial.squares - quick):
             return trial
-        if len(moments) == 2:  # one step is tried as such
-            return None
-        trial, moments = rest, moments[1:]
-    return None
+        trial = fewer
+    return None  # one step is tried as such
 
 
 def _together(step: Step, moments: Sequence[Values]) -> Term:
@@ -65,25 +64,23 @@ def _moments(fitted: Fitted, step: Step, quick: float, relevant: float) -> list[
     columns = _columns(fitted, step, blocks)
     left = fitted.projector(fitted.residual[:, None])[:, 0]
     near = LIMITS.one_moment * (blocks[-1][0][-1] - blocks[0][0][-1]) / len(blocks)
-    found, own, squares = [], np.empty((left.size, 0)), float(left @ left)
+    found: list[Values] = []
+    own, squares = np.empty((left.size, 0)), float(left @ left)
     while len(found) < LIMITS.most_steps:
         apart = [k for k, (one, _) in enumerate(blocks) if all(abs(one[-1] - v[-1]) > near for v in found)]
-        fits = {k: _fit(np.column_stack((own, columns[:, 2 * k : 2 * k + 2])), left) for k in apart}
-        best = min(fits, key=lambda k: fits[k][1], default=None)
-        if best is None or squares - fits[best][1] < max(relevant, LIMITS.one_step * (squares - quick)):
+        fits = {k: _fit(np.column_stack((own, columns[:, 2 * k : 2 * k + 2])), left)[1] for k in apart}
+        best = min(apart, key=lambda k: fits[k], default=None)
+        if best is None or squares - fits[best] < max(relevant, LIMITS.one_step * (squares - quick)):
             break
-        known = [Term(step.several(len(found)), tuple(v for one in found for v in one))] if found else []
+        known = [_together(step, found)] if found else []
         moved = added(fitted.simulator, in_order((*fitted.terms, *known)), fitted.terms)
         rest = [one - other for one, other in zip(full, moved, strict=True)]
-        moment = step.sharpened(blocks[best][0], frames, rest)[-1]
-        exact = step.at(moment, frames)
+        moments = [*(one[-1] for one in found), step.sharpened(blocks[best][0], frames, rest)[-1]]
+        (offset, *_), (_, gain, _) = exact = step.at(moments[-1], frames)
         own = np.column_stack((own, _columns(fitted, step, [exact])))
         strengths, squares = _fit(own, left)
-        moments = [*(one[-1] for one in found), moment]
-        (offset, *_), (_, gain, _) = exact
-        found = [
-            (a * offset, b * gain, at) for (a, b), at in zip(strengths.reshape(-1, 2), moments, strict=True)
-        ]
+        sizes = (strengths.reshape(-1, 2) * (offset, gain)).tolist()
+        found = [(*size, moment) for size, moment in zip(sizes, moments, strict=True)]
     return sorted(found, key=lambda values: values[-1])
 
 
@@ -95,6 +92,6 @@ def _columns(fitted: Fitted, step: Step, blocks: Sequence[Sequence[Values]]) -> 
 
 def _fit(columns: FloatArray, left: FloatArray) -> tuple[FloatArray, float]:
     """Strengths (k,) of columns (count, k), and what they leave of a residual, sum of squares."""
-    strengths = np.linalg.lstsq(columns, left, rcond=None)[0]
+    strengths = np.asarray(np.linalg.lstsq(columns, left, rcond=None)[0], dtype=np.float64)
     rest = left - columns @ strengths
     return strengths, float(rest @ rest)

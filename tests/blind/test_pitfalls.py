@@ -197,6 +197,29 @@ def test_a_drift_has_either_direction(size):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sizes", [(0.02, 0.0, 0.02), (0.02, 0.0, -0.02), (0.02, -0.02, 0.02)])
+def test_several_jumps_of_the_zero_are_found_together(sizes):
+    """One alone, or a drift, took the place of all of them; the verdict was unknown."""
+    moments = [share for share, size in zip((0.2, 0.5, 0.8), sizes, strict=True) if size]
+
+    def jumped(u, static, t, number):
+        jumps = [size * (t > share * t[-1]) for share, size in zip((0.2, 0.5, 0.8), sizes, strict=True)]
+        return static + sum(jumps) * np.ptp(static)
+
+    seen, _ = _runs_of_plays(jumped)
+    calm, unseen = _runs_of_plays(lambda u, static, t, number: static)
+    model = pt.identify(seen)
+    found = pt.diagnose([seen], model)
+    assert ([one.cause for one in found.found], found.correctable) == (["step"], ("step",))
+    times = [one.value for one in found.found[0].parameters if one.name.startswith("time")]
+    assert times == pytest.approx([share * seen.time_s[-1] for share in moments], abs=0.1)
+    models = [model, pt.identify(pt.correct(seen, found)), pt.identify(calm)]
+    jumping, corrected, sound = (one.rms_percent for one in pt.evaluate(unseen, models).models)
+    assert 3.0 * sound < jumping
+    assert corrected < sound + 0.1 * (jumping - sound)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.08, -0.08])
 def test_a_gain_that_drifts_is_no_drift_of_the_zero(size):
     """Upwards it was unknown, downwards a heat that cools nothing."""

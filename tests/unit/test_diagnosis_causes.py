@@ -314,6 +314,20 @@ def test_a_step_is_shared_out_over_twenty_samples():
     )
 
 
+def test_steps_at_several_moments_add_up():
+    """Each is shared out as if it were alone, of the output before all of them; named by their numbers."""
+    step, y = CAUSE["step"], np.sin(T) + 2.0
+    twice = step.several(2)
+    shown = twice.on_output(y, (0.5, 0.1, 1.0, -0.2, 0.05, 2.0), _frame())
+    alone = [step.on_output(y, one, _frame()) - y for one in ((0.5, 0.1, 1.0), (-0.2, 0.05, 2.0))]
+    np.testing.assert_allclose(shown, y + sum(alone), atol=1e-12)
+    names = [one.name for one in twice.quantities(_frame())]
+    assert names == ["offset", "gain", "time", "offset 2", "gain 2", "time 2"]
+    known = [Estimate(name, 1.0, "", 0.5, 2.0) for name in names]
+    assert [one.name for one in twice.strengths_of(known)] == ["offset", "gain", "offset 2", "gain 2"]
+    assert (step.sudden, step.by_pieces, twice.sudden, twice.by_pieces) == (True, False, False, True)
+
+
 @pytest.mark.parametrize("scale", [1.0, 500.0])
 def test_accommodation_is_a_low_pass_along_the_path(scale):
     """Against the recurrence, a sample at a time; also where the path is hundreds of decay lengths."""

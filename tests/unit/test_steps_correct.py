@@ -86,6 +86,27 @@ def _added(name, y, t):
     return np.interp(t * 0.999, t, y), {"skew": -0.001}
 
 
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_several_steps_are_taken_out(clean, polarity):
+    """All of them, back to the output before the first; what lies beside a moment is not known."""
+    y, t = polarity * clean.output, clean.time_s
+    spoilt = y + (t > 5.0) * (0.4 + 0.03 * y) + (t > 12.0) * (-0.2 + 0.02 * y)
+    values = (
+        ("offset", 0.4),
+        ("gain", 0.03),
+        ("time", 5.0),
+        ("offset 2", -0.2),
+        ("gain 2", 0.02),
+        ("time 2", 12.0),
+    )
+    run = replace(clean, output=polarity * spoilt)
+    found = Cause("step", True, 0.005, 90.0, 90.0, tuple(Parameter(n, v, "1", v, v) for n, v in values))
+    done = pt.correct(run, replace(_diagnosis(run, "step", polarity=polarity), causes=(found,)))
+    kept = ~done.masked
+    np.testing.assert_allclose(done.output[kept], clean.output[kept], atol=1e-9)
+    assert 0.0 < done.masked.mean() < 0.01
+
+
 def test_where_no_input_is_never_reached_a_leak_keeps_its_first_sample(clean):
     """There it may fall back to any output; where the input begins at zero, it falls back to that of none."""
     spoilt, values = _added("leak", clean.output, clean.time_s)

@@ -72,12 +72,14 @@ def _as_late(state: State, trials: list[tuple[Fitted, Score]]) -> list[tuple[Fit
     ]
 
 
-def _at_several_moments(
-    state: State, trials: list[tuple[Fitted, Score]]
-) -> list[tuple[Fitted, Score]]:
+def _at_several_moments(state: State, trials: list[tuple[Fitted, Score]]) -> list[tuple[Fitted, Score]]:
     """Return a refit with several steps, where a step is promising and all other trials are far worse."""
     for score in state.scores.scores:
-        if isinstance(score.cause, Step) and promising(state, score) and score.cause.family not in state.families:
+        if (
+            isinstance(score.cause, Step)
+            and promising(state, score)
+            and score.cause.family not in state.families
+        ):
             several = several_steps.fitted_with(state, score.cause, [trial for trial, _ in trials])
             return [] if several is None else [(several, score)]
     return []
