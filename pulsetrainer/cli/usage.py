@@ -37,12 +37,13 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
         given = _as_typed(str(getattr(error, "option_name", "")), words)
-        near, moved = _alike(given, context), _elsewhere(given, context, words)
+        at = next((k for k, word in enumerate(words) if word.partition("=")[0] == given), len(words))
+        near, moved = _alike(given, context), _elsewhere(given, at, context, words)
         hint = f"did you mean {' or '.join(near)}?" if near else help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
         known = NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")
-        known = moved or known.format(behind=behind, value=_value_of(given, words)).rstrip()
+        known = moved or known.format(behind=behind, value=_value_of(at, words)).rstrip()
         if Path(given).is_file():
             known = f"a name that begins with a dash: ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
@@ -91,10 +92,9 @@ def check_apart(words: Sequence[str]) -> None:
         )
 
 
-def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
+def _elsewhere(option: str, at: int, context: Any, words: Sequence[str]) -> str:
     """Return the line with an option on the side of the command that it belongs to; else empty."""
     commands = getattr(getattr(context, "command", None), "commands", {})
-    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
     if option == "--settings":
         end, side = at + 1 + ("=" not in words[at]), "before"
         line = [*(*words, "FILE")[at:end], *words[:at], *words[end:]]
@@ -105,9 +105,8 @@ def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
     return f"put it {side} the command: {shlex.join(['pulsetrainer', *line])}" if line != [*words] else ""
 
 
-def _value_of(option: str, words: Sequence[str]) -> str:
-    """Return what was typed behind an option, or in it after ``=``, as a shell takes it."""
-    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
+def _value_of(at: int, words: Sequence[str]) -> str:
+    """Return what was typed behind the option at that place, or in it after ``=``, as a shell takes it."""
     value = "".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2])
     return value and shlex.quote(value)
 

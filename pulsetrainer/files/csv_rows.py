@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,15 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_cells import has_thousands, is_number, number, quoted
-from pulsetrainer.files.csv_dialect import Dialect, column_words
+from pulsetrainer.files.csv_cells import has_thousands, is_number, number, quoted, readable
+from pulsetrainer.files.csv_dialect import Dialect, detect
+from pulsetrainer.files.csv_encoding import end_of
+from pulsetrainer.files.csv_headings import column_words
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
 _GROWTH = 1.125
+_ALIKE = 16  # rows with as many decimals: those of the last are no chance
 _NO_READING = (9.9e37, 9.91e37)  # IEEE 488.2: an instrument's overload, and its NaN
 
 
@@ -59,16 +62,36 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece
     return Rows(kept.finished(), tuple(reader.shifts), reader.misfit, reader.remedy)
 
 
+def cell_at(path: Path, line: int, column: int) -> str:
+    """Return what stands in a cell of a text: line from 1, column from 0; raises as ``detect``."""
+    dialect = detect(path)
+    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+        text = next(islice(stream, line - 1, None), "")
+    return (*dialect.split(readable(text.strip("\r\n"))), *[""] * (column + 1))[column]
+
+
+def ends_in_a_number(path: Path, dialect: Dialect) -> bool:
+    """Whether a file was cut within its last number: no line end, and fewer decimals than in all rows before.
+
+    OSError where it cannot be read.
+    """
+    text = end_of(path, dialect.encoding)
+    rows = [dialect.split(line) for line in text.splitlines() if line.strip()][-_ALIKE:]
+    if text.endswith(("\n", "\r")) or len(rows) < _ALIKE:
+        return False
+    sign = "," if dialect.decimal_comma else "."
+    *before, last = [len(cells[-1].partition(sign)[2]) for cells in rows]
+    numbers = all(is_number(cells[-1].removesuffix(sign)) for cells in rows)
+    return numbers and len(set(before)) == 1 and last < before[0]
+
+
 def _of_a_comma(cells: Sequence[str]) -> str:
     """Say what to do about a row that is too long for a decimal comma; empty where it cannot be one."""
-    pair = next(
-        (p for p in reversed([*pairwise(cells)]) if p[0].lstrip("+-").isdigit() and p[1].isdigit()), None
-    )
-    if pair is None:
+    pairs = [p for p in pairwise(cells) if p[0].lstrip("+-").isdigit() and p[1].isdigit()]
+    if not pairs:
         return ""
-    return (
-        f"if {','.join(pair)} is a decimal comma, write {'.'.join(pair)}, or part the columns by semicolons"
-    )
+    comma, point = ",".join(pairs[-1]), ".".join(pairs[-1])
+    return f"if {comma} is a decimal comma, write {point}, or part the columns by semicolons"
 
 
 class _Kept:
@@ -178,6 +201,7 @@ class _Reader:
         """Look at every cell; NaN for what is missing, and for text in a column of text."""
         dialect = self.dialect
         values = np.full((len(lines), len(dialect.names)), np.nan)
+        commas = dialect.delimiter == ","
         for row, (count, line) in enumerate(zip(places, lines, strict=True)):
             cells = dialect.split(line)
             if dialect.text_columns.issuperset(range(len(cells), len(dialect.names))):
@@ -186,9 +210,7 @@ class _Reader:
                 self._first_misfit(
                     f"{self.path} has {counted(len(cells), 'column')} in line {count}, "
                     f"expected {len(dialect.names)}: {', '.join(dialect.names)}",
-                    _of_a_comma(cells)
-                    if dialect.delimiter == "," and len(cells) > len(dialect.names)
-                    else "",
+                    _of_a_comma(cells) if commas and len(cells) > len(dialect.names) else "",
                 )
                 continue
             for k, cell in enumerate(cells):

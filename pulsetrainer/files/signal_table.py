@@ -44,7 +44,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     import numpy as np  # noqa: PLC0415
 
     from pulsetrainer.core import excitations  # noqa: PLC0415
-    from pulsetrainer.files.csv_dialect import column_words  # noqa: PLC0415
+    from pulsetrainer.files.csv_headings import column_words  # noqa: PLC0415
     from pulsetrainer.files.time_column import unit_of_time  # noqa: PLC0415
 
     table, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")

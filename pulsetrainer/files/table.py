@@ -26,15 +26,10 @@ from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.csv_cells import number, quoted
-from pulsetrainer.files.csv_dialect import (
-    Dialect,
-    cell_at,
-    column_words,
-    detect,
-    ends_in_a_number,
-    ends_in_zeros,
-)
-from pulsetrainer.files.csv_rows import parse
+from pulsetrainer.files.csv_dialect import Dialect, detect
+from pulsetrainer.files.csv_encoding import end_of
+from pulsetrainer.files.csv_headings import column_words
+from pulsetrainer.files.csv_rows import cell_at, ends_in_a_number, parse
 from pulsetrainer.files.input_file import unreadable
 from pulsetrainer.files.time_stamps import how_to_write
 
@@ -284,7 +279,7 @@ def read_table(
     table = replace(table, columns=columns, shifts=rows.shifts)
     if rows.misfit and not bad_rows:
         bad = table.bad_rows()
-        if bad.size and bad[0] == table.rows - 1 and ends_in_zeros(path, dialect):
+        if bad.size and bad[0] == table.rows - 1 and end_of(path, dialect.encoding).endswith("\0"):
             raise DataError(
                 f"{path} ends in zero bytes, in {table.place(table.rows - 1)}: the recorder stopped there",
                 hint=f"cut the file after line {table.line_of(table.rows - 1) - 1}, or {remedy}",

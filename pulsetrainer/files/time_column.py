@@ -17,7 +17,8 @@ from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_cells import quoted
-from pulsetrainer.files.csv_dialect import cell_at, column_words
+from pulsetrainer.files.csv_headings import column_words
+from pulsetrainer.files.csv_rows import cell_at
 from pulsetrainer.files.table import Table
 from pulsetrainer.files.time_stamps import how_to_write, is_since_1970, stated_rate, unit_of_count
 
