@@ -81,7 +81,7 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         ),
         (
             "qemu:?wire-seed=x",
-            "qemu parameter wire-seed must be a whole number, 0 or more, got x",
+            "qemu parameter wire-seed must be a whole number of up to nine digits, got x",
             "wire-seed",
         ),
     ],
