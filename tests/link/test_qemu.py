@@ -77,7 +77,7 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         (
             "qemu:?wire=1",
             "qemu parameter wire must be the share of bytes to damage, from 0 to 0.1, got 1",
-            "wire-seed",
+            '"qemu:?wire=0.0001"',
         ),
         (
             "qemu:?wire-seed=x",
