@@ -22,7 +22,7 @@ from pulsetrainer.device.schemes import find_opener
 from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.output_name import check_artefact_name
-from pulsetrainer.files.run_from_table import run_from_table
+from pulsetrainer.files.run_from_table import runs_from_tables
 from pulsetrainer.files.tuning import read_tuned
 from pulsetrainer.steps.arguments import several
 from pulsetrainer.steps.import_ import import_parts
@@ -242,22 +242,19 @@ def read_table(
             f"read_table needs the name of a column for {' and for '.join(missing)}",
             hint=f'such as pt.read_table("{files[0]}", input="u", output="y")',
         )
-    parts = [
-        run_from_table(
-            path,
-            input=input,
-            output=output,
-            time=time,
-            reference=reference,
-            input_unit=input_unit,
-            output_unit=output_unit,
-            rate_Hz=rate_Hz,
-            no_time=no_time,
-            skip_bad_rows=skip_bad_rows,
-        ).run
-        for path in files
-    ]
-    return import_parts(parts, resample=resample).run
+    tables = runs_from_tables(
+        files,
+        input=input,
+        output=output,
+        time=time,
+        reference=reference,
+        input_unit=input_unit,
+        output_unit=output_unit,
+        rate_Hz=rate_Hz,
+        no_time=no_time,
+        skip_bad_rows=skip_bad_rows,
+    )
+    return import_parts([table.run for table in tables], resample=resample).run
 
 
 def _shape(pulse: Pulse) -> Shape:

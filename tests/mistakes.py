@@ -32,6 +32,7 @@ def lay_out(folder: Path) -> None:
     (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
     (folder / "wrong.toml").write_text("levles = 48\n")
     (folder / "limits.toml").write_text("[limits]\ncurent_A = 1.0\n")
+    (folder / "other" / "model.h5").write_bytes(SIGNATURE)
     (folder / "two words.csv").write_text("t,u,y\n0,0,0\n")
     (folder / "bare").mkdir()
     (folder / "bare.toml").write_text("")
@@ -131,8 +132,10 @@ def at_once() -> dict[str, Mistake]:
         name: Mistake(line, 2, next((word for word in line if word in named), ""))
         for name, line in words.items()
     }
-    found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got model.h5")
-    found["an argument to a command of none"] = Mistake(("tune", "now"), 2, "got now")
+    found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got 'model.h5'")
+    found["an argument to a command of none"] = Mistake(
+        ("tune", "now"), 2, "got 'now' as", "leave it out; the file of"
+    )
     for name, (line, code, where, then) in _WORDS_OF_A_TIRED_HAND.items():
         found[name] = Mistake(tuple(line.split()), code, where, then)
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
@@ -242,16 +245,26 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "invert normal bifid --model model.h5 -o out.h5",
             2,
-            "takes WAVEFORM only, got bifid",
-            "run it once for each",
+            "takes WAVEFORM only, got 'bifid'",
+            "if it is another pulse: one at a time, each with an output",
         ),
     ),
-    "a file that a look at the device does not take": ("doctor run.h5", 2, "got run.h5", "pulsetrainer show"),
+    "a file that a look at the device does not take": ("doctor run.h5", 2, "got 'run.h5'", "leave it out"),
+    "a word for a look at the device": ("doctor now", 2, "got 'now' as well", "leave it out\n"),
+    "a port without its option": (
+        *("capture identification /dev/ttyUSB0 -o out.h5", 2, "got '/dev/ttyUSB0' as well"),
+        "a port is an option: --port /dev/ttyUSB0\n",
+    ),
+    "two words too many": ("tune now then", 2, "takes options only, got 'now', 'then' as well", "leave it"),
+    "pulses with a blank": (
+        *("session --model model.h5 --pulses normal bifid -o out.h5", 2, "got 'bifid' as well"),
+        "pulses are an option: --pulses normal,bifid\n",
+    ),
     "a table that is absent": (
         "import absent.csv -o out.h5",
         2,
-        "absent.csv does not exist",
-        "give its path",
+        "absent.csv does not exist; and --input is missing, and so is --output",
+        "give its path; and name the columns, such as --input 2 --output 3\n",
     ),
     "json before the command": (
         *("--json show run.h5", 2, "pulsetrainer has no option --json"),
@@ -272,7 +285,7 @@ _WORDS_OF_A_TIRED_HAND = {
             "invert normal --model model.h5 -o out.h5 --force-max 90%",
             2,
             "got '90%'",
-            "and not in %; --force",
+            "give it in its own unit, not in %; --force-max: force at the top of the pulse, N or",
         ),
     ),
     "a choice without its word": (
@@ -310,16 +323,25 @@ _WORDS_OF_A_TIRED_HAND = {
         *("--model was given 2 times", "give it once"),
     ),
     "models with a comma": (
-        *("evaluate run.h5 --model model.h5,model.h5", 3, "(--model)", "--model model.h5 --model model.h5"),
+        *("evaluate run.h5 --model model.h5,model.h5", 3, "(--model)", "file once: --model model.h5\n"),
+    ),
+    "two models with a comma": (
+        *("evaluate run.h5 --model model.h5,other/model.h5", 3, "(--model)"),
+        "name them one by one: --model model.h5 --model other/model.h5\n",
     ),
     "runs with a comma": (
-        *("diagnose run.h5,run.h5 --model model.h5 -o out.h5", 3, "(argument ", "one by one: run.h5 run.h5"),
+        *("diagnose run.h5,run.h5 --model model.h5 -o out.h5", 3, "(argument ", "each file once: run.h5\n"),
     ),
-    "a file behind a switch": ("check model.h5 --update out.h5", 2, "got out.h5", "--update -o out.h5"),
-    "a drive for a session": (
-        *("session --model model.h5 drive.h5 -o out.h5", 2, "got drive.h5", "a model is an option"),
+    "a file behind a switch": (
+        "check model.h5 --update out.h5",
+        2,
+        "got 'out.h5'",
+        "to write is an option: -o out.h5",
     ),
-    "a drive refined over itself": ("refine drive.h5 -o drive.h5", 2, "drive.h5 (-o)", "--overwrite"),
+    "a drive refined over itself": (
+        *("refine drive.h5 -o drive.h5", 2, "drive.h5 is what refine works on and would be lost\n"),
+        "such as drive-2.h5, or give --overwrite to replace it",
+    ),
     "an option of many letters behind one dash": (
         *("identify run.h5 -output out.h5", 2, "there is no option -output", "-o out.h5"),
     ),
@@ -327,12 +349,36 @@ _WORDS_OF_A_TIRED_HAND = {
         *("identify run.h5 -o=out.h5", 2, "there is no option -o=out.h5", "-o out.h5"),
     ),
     "a column behind one dash": (
-        *("import x.csv -output force -o out.h5", 2, "no option -output", "for a column, two dashes"),
+        *("import x.csv -output force -o out.h5", 2, "no option -output\n", "two dashes: --output force\n"),
     ),
-    "a word for a switch": (
-        *("capture identification -o out.h5 --condition no", 2, "got no as well", "a switch takes no value"),
+    "a unit behind one dash": (
+        *(
+            "import x.csv -output-unit N -o out.h5",
+            2,
+            "no option -output-unit\n",
+            "dashes: --output-unit N\n",
+        ),
     ),
-    "two models to check": ("check model.h5 run.h5", 2, "got run.h5 as well", "one model at a time"),
+    "an output of import behind one dash": (
+        *(
+            "import x.csv --input 1 --output 2 -output out.h5",
+            2,
+            "give the file to write after -o",
+            "-o out.h5",
+        ),
+    ),
+    **{
+        f"{word} for a switch{'' if blank == ' ' else ' in one word'}": (
+            *(f"capture identification -o out.h5 --condition{blank}{word}", 2),
+            *(f"--condition is a switch and takes no value, got '{word}'", then),
+        )
+        for word, then in (("no", "to switch it off: --no-condition\n"), ("yes", "write --condition alone\n"))
+        for blank in " ="
+    },
+    "no for a switch without an opposite": (
+        *("show run.h5 --json no", 2, "--json is a switch and takes no value, got 'no'"),
+        "leave --json out\n",
+    ),
     "a pulse and a model exchanged": (
         *("invert model.h5 --model normal -o out.h5", 3, "normal (--model) does not exist"),
         "pulsetrainer invert normal --model model.h5",
@@ -365,7 +411,12 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "another word for capture": ("measure", 2, "'measure'", "pulsetrainer capture identification"),
     "a word of others for identify": ("fit run.h5", 2, "'fit'", "pulsetrainer identify run.h5"),
-    "a word of others for two things": ("calibrate", 2, "'calibrate'", "of a coil: pulsetrainer tune"),
+    "a word of others for two things": (
+        "calibrate",
+        2,
+        "'calibrate'",
+        "then pulsetrainer identify run.h5 -o",
+    ),
     "a word of others for the bench": ("simulate normal", 2, "'simulate'", "the port bench:, which is the"),
     "a port where none goes": ("identify run.h5 -o out.h5 --port bench:", 2, "no option --port", "no device"),
     "a height as a share": (
@@ -374,10 +425,10 @@ _WORDS_OF_A_TIRED_HAND = {
     "a port to look at": ("ports --port /dev/ttyUSB0", 2, "no option --port", "pulsetrainer doctor --port"),
     "a version behind a command": ("identify --version", 2, "no option --version", "pulsetrainer --version"),
     "a diagnosis without its option": (
-        *("correct run.h5 diagnosis.h5 -o out.h5", 2, "got diagnosis.h5", "--diagnosis diagnosis.h5"),
+        *("correct run.h5 diagnosis.h5 -o out.h5", 2, "got 'diagnosis.h5'", "--diagnosis diagnosis.h5"),
     ),
     "a name that begins with a dash": (
-        *("identify -run.h5 -o out.h5", 2, "no option -run.h5", "begins with a dash: ./-run.h5"),
+        *("identify -run.h5 -o out.h5", 2, "no option -run.h5", "the name of a file, write ./-run.h5"),
     ),
     "a word of another option": (
         *("identify run.h5 -o out.h5 --method relay", 2, "--method 'relay'", "option: --reading relay"),
@@ -386,10 +437,15 @@ _WORDS_OF_A_TIRED_HAND = {
         *("invert normal.csv --model model.h5 -o out.h5", 3, "normal.csv (argument", "without .csv"),
     ),
     "a model updated over itself": (
-        *("check model.h5 --update -o model.h5 --overwrite", 2, "would be lost", "name another file"),
+        *("check model.h5 --update -o model.h5 --overwrite", 2, "would be lost", "such as model-2.h5\n"),
     ),
     "a seed that is a fraction": (
-        *("capture identification -o out.h5 --port bench:?seed=1.5", 2, "seed=1.5 is not a whole", "bench:"),
+        *("capture identification -o out.h5 --port bench:?seed=1.5", 2, "from 0 to 16777215, got 1.5"),
+        '--port "bench:?seed=3"\n',
+    ),
+    "a serial number that is none": (
+        *("capture identification -o out.h5 --port bench:?serial=x", 2, "of up to eight digits, got x"),
+        '--port "bench:?serial=3"\n',
     ),
     "a backslash in the settings": (
         *("--settings back.toml show run.h5", 2, "back.toml cannot be read", "into single quotes"),
@@ -431,7 +487,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "one table twice": (
         *("import x.csv x.csv --input u --output y -o out.h5", 2, "x.csv is named twice", "each file once"),
     ),
-    "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "has no bounds", "= [90, 100]"),
+    "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "no bounds", 'percent" = [90, 100]'),
     "a bound the wrong way round": (
         *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", 'percent" = [90.0, 98.0]'),
     ),
@@ -485,7 +541,12 @@ _WORDS_OF_A_TIRED_HAND = {
         ),
     ),
     "the shell behind the switch": (
-        *("--show-completion zsh", 2, "takes no value, got zsh", "_PULSETRAINER_COMPLETE=source_zsh"),
+        *(
+            "--show-completion zsh",
+            2,
+            "takes no value, got zsh",
+            "print it: _PULSETRAINER_COMPLETE=source_zsh",
+        ),
     ),
     "a setting of a table that is nearly one": (
         *(
@@ -495,9 +556,14 @@ _WORDS_OF_A_TIRED_HAND = {
             "did you mean current_A under [limits]?",
         ),
     ),
-    "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
+    "a switch with a value": (
+        "show run.h5 --json=yes",
+        2,
+        "--json is a switch and takes no value, got 'yes'",
+        "--json alone",
+    ),
     "settings without their option": (
-        *("tune pulsetrainer.toml", 2, "got pulsetrainer.toml", "pulsetrainer tune -o pulsetrainer.toml"),
+        *("tune pulsetrainer.toml", 2, "got 'pulsetrainer.toml'", "is an option: -o pulsetrainer.toml"),
     ),
     "a model behind an option where none goes": (
         *("check --model model.h5", 2, "no option --model", "pulsetrainer check model.h5"),
@@ -512,9 +578,13 @@ _WORDS_OF_A_TIRED_HAND = {
     "a beginning of an option": (
         *("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out or --overwrite?\n"),
     ),
-    "two drives": ("play drive.h5 model.h5 -o out.h5", 2, "got model.h5 as well", "one drive at a time"),
-    "a name with spaces, of the only file": (
-        *("show two words.csv", 2, "got words.csv as well", "in quotes: 'two words.csv'"),
+    "a table with spaces, where none goes": (
+        *("show two words.csv", 2, "got 'words.csv' as well"),
+        "in quotes, and import the table first: pulsetrainer import 'two words.csv' --input",
+    ),
+    "a table with spaces, of several files": (
+        *("identify two words.csv -o out.h5", 3, "two (argument RUN.h5) does not exist"),
+        "in quotes, and import the table first: pulsetrainer import 'two words.csv' --input",
     ),
     "a name with spaces, of several files": (
         "import two words.csv --input u --output y -o out.h5",
@@ -595,8 +665,8 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "play drive.h5 -o out.h5 --track-heat --no-track-heat",
             2,
-            "and takes one of the two",
-            "give it once",
+            "--track-heat and --no-track-heat were both given, and are opposites",
+            "give one of the two, or neither",
         ),
     ),
     "two seeds of a bench": (
@@ -608,19 +678,23 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force for a capture": (
         *("capture identification -o out.h5 --force-max 5", 2, "no option --force-max"),
-        "to limit the force: --limit-force 5\n",
+        "for less force a lower --current-max; --limit-force only stops it above a force\n",
+    ),
+    "a force for a drive": (
+        *("play drive.h5 -o out.h5 --force-max 5", 2, "no option --force-max"),
+        "pulsetrainer invert normal --model model.h5 -o drive.h5 --force-max 5\n",
     ),
     "a force for a session": (
         *("session --model model.h5 -o out.h5 --force-max=5", 2, "no option --force-max"),
-        "--amplitude, in % of what the model reaches; to limit the force: --limit-force 5\n",
+        "--amplitude, in % of what the model reaches\n",
     ),
     "a page of a playback": (
         *("play drive.h5 -o out.h5 --html r.html", 2, "no option --html"),
-        "pulsetrainer evaluate played.h5 --html r.html",
+        "pulsetrainer evaluate out.h5 --html r.html\n",
     ),
     "a page of a model": (
         *("identify run.h5 -o out.h5 --html r.html", 2, "no option --html"),
-        "-o diagnosis.h5 --html r.html; for a figure: pulsetrainer plot model.h5",
+        "--model out.h5 -o diagnosis.h5 --html r.html; for a figure: pulsetrainer plot out.h5\n",
     ),
     "a text of a model": ("show model.h5 -o x.txt", 2, "no option -o", "pulsetrainer export model.h5 -o"),
     "a rate for a pulse": (
@@ -710,10 +784,14 @@ INSIDE = {
         )
     },
     **{
-        f"{words[0]} with one of two in no units": Mistake(words, 3, "in no units", f"{table} again {_UNITS}")
-        for table, words in (
-            ("plain/run.h5", ("identify", "plain/run.h5", "run.h5", "-o", "out.h5")),
-            ("plain/run.h5", ("diagnose", "plain/run.h5", "--model", "model.h5", "-o", "out.h5")),
+        f"{words[0]} with one of two in no units": Mistake(
+            *(words, 3, "in no units"),
+            "if both are of one device, and the numbers of that table are in A and N: import the table of "
+            f"plain/run.h5 again {_UNITS}; otherwise {apart}",
+        )
+        for apart, words in (
+            ("identify the runs one by one\n", ("identify", "plain/run.h5", "run.h5", "-o", "out.h5")),
+            ("give a model of", ("diagnose", "plain/run.h5", "--model", "model.h5", "-o", "out.h5")),
         )
     },
     "a rate that the device does not have": Mistake(
@@ -726,14 +804,15 @@ INSIDE = {
     ),
     "two lines of headings": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "-o", "out.h5"),
-        *(3, "is in 'Time', expected s", "keep one line of headings"),
+        *(3, "'Time' in the line below the heading 'Channel' of heads.csv was taken for the unit of the"),
+        "if that line holds headings again, delete it; if it holds the units, correct",
     ),
     "two lines of headings, and a rate": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "--rate", "10", "-o", "out.h5"),
         *(
             3,
             "the line below the heading 'CH1' of heads.csv",
-            "keep one line of headings, or give --input-unit",
+            "keep one line of headings, or give a known unit, such as --input-unit N or mm/s^2",
         ),
     ),
     "cells with their units": Mistake(
@@ -776,7 +855,12 @@ INSIDE = {
         ("play", "drive.h5", "-o", "out.h5", "--port", "COM3"), 4, "no port COM3", "COM ports are of Windows"
     ),
     "a port without its folder": Mistake(
-        ("play", "drive.h5", "-o", "out.h5", "--port", "ttyUSB99"), 4, "no port", "--port /dev/ttyUSB99"
+        ("play", "drive.h5", "-o", "out.h5", "--port", "ttyUSB99"),
+        *(
+            4,
+            "there is no port ttyUSB99, nor /dev/ttyUSB99 (ports",
+            "ports`; give the whole path that it shows",
+        ),
     ),
     "heat of a coil that is not known": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--track-heat"),
@@ -796,7 +880,7 @@ INSIDE = {
     ),
     "two tables of different headings": Mistake(
         (*("import", "force.csv", "load.csv", "--input", "current_A", "--output", "force_N"), "-o", "out.h5"),
-        *(3, "load.csv has no column 'force_N'", "by its number: 1 is the first"),
+        *(3, "load.csv has no column 'force_N'", "give the column by its number, counted from 1, if it is"),
     ),
     "a comma in a parameter of the bench": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?creep=0,05"),
@@ -820,7 +904,15 @@ INSIDE = {
             *("import", "force.csv", "--input", "current_A", "--output", "force_N", "--resample", "1e12"),
             *("-o", "out.h5"),
         ),
-        *(2, "--resample to steps of 1e-12 s", "give --resample even"),
+        *(2, "--resample to 1e+12 Hz would make 2e+12 samples out of the 3 of force.csv, expected from 2 to"),
+        "give a lower rate, or --resample even",
+    ),
+    "steps far too coarse": Mistake(
+        (
+            *("import", "force.csv", "--input", "current_A", "--output", "force_N", "--resample", "0.001"),
+            *("-o", "out.h5"),
+        ),
+        *(2, "--resample to 0.001 Hz would make 1 sample out of the 3", "give a higher rate, or"),
     ),
     "a table beyond the current": Mistake(
         ("capture", "press.csv", "-o", "out.h5", "--current-max", "0.5"),
@@ -836,11 +928,7 @@ INSIDE = {
     ),
     "a model to verify with": Mistake(
         ("extend", "run.h5", "--model", "model.h5", "--verify", "model.h5", "-o", "out.h5"),
-        *(
-            3,
-            "model.h5 (--verify) is a model, expected a run",
-            "one that served neither it nor the diagnosis",
-        ),
+        *(3, "run.h5: expected a diagnosis, got a run", "pulsetrainer diagnose run.h5 --model model.h5"),
     ),
     "a run for a model": Mistake(
         ("invert", "normal", "--model", "run.h5", "-o", "out.h5"),
@@ -892,21 +980,57 @@ INSIDE = {
         ("import", "wide.csv", "-o", "out.h5"), 2, "--input is missing", "--input Spannung --output Kraft"
     ),
     "a table that is empty": Mistake(
-        ("import", "empty.csv", "-o", "out.h5"), 2, "empty.csv is empty", "export"
+        *(
+            ("import", "empty.csv", "-o", "out.h5"),
+            2,
+            "empty.csv is empty; and --input is missing, and so is",
+        ),
+        "export the recording again; and name the columns, such as --input 2 --output 3\n",
+    ),
+    "a table with a column that is not named": Mistake(
+        ("import", "wide.csv", "--input", "Spannung", "-o", "out.h5"),
+        *(2, "--output is missing: column of the output", "such as --output Kraft\n"),
     ),
     "a session and a playback": Mistake(
         *(("evaluate", "session.h5", "played.h5"), 2),
-        *("got 1 playback, 1 session", "one session at a time and nothing with it: session.h5 alone"),
+        "got 1 playback, 1 session",
+        "each by itself: pulsetrainer evaluate session.h5, and pulsetrainer evaluate played.h5\n",
     ),
     "a session, a run and a model": Mistake(
         *(("evaluate", "run.h5", "session.h5", "--model", "model.h5"), 2),
-        *("got 1 run, 1 session, 1 model", "one session at a time and nothing with it: session.h5 alone"),
+        "got 1 run, 1 session, 1 model",
+        "evaluate session.h5, and pulsetrainer evaluate run.h5 --model model.h5\n",
     ),
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
     "a model without its option": Mistake(
         ("evaluate", "run.h5", "--model", "model.h5", "model.h5"), 3, "got a model", "a --model of its own"
     ),
-    "a playback and a run": Mistake(("evaluate", "played.h5", "run.h5"), 2),
+    "a playback and a run": Mistake(
+        *(("evaluate", "played.h5", "run.h5"), 2, "got 1 playback, 1 run"),
+        "by itself: pulsetrainer evaluate played.h5, and pulsetrainer evaluate run.h5 --model model.h5\n",
+    ),
+    "a drive for a session": Mistake(
+        ("session", "--model", "model.h5", "drive.h5", "-o", "out.h5"),
+        *(
+            2,
+            "got 'drive.h5' as well",
+            "a session makes its own drives; to play one: pulsetrainer play drive.h5",
+        ),
+    ),
+    "a run for a check": Mistake(
+        *(("check", "model.h5", "run.h5"), 2, "got 'run.h5' as well"),
+        "leave it out; to test a model on a run: pulsetrainer evaluate run.h5 --model model.h5\n",
+    ),
+    "two models to check": Mistake(
+        ("check", "model.h5", "plain/model.h5"), 2, "got 'plain/model.h5'", "one model at a time"
+    ),
+    "a model for a drive": Mistake(
+        ("play", "drive.h5", "model.h5", "-o", "out.h5"), 2, "got 'model.h5'", "a drive already holds what"
+    ),
+    "a drive to tune by": Mistake(
+        ("tune", "drive.h5"), 2, "got 'drive.h5'", "a drive is an option: --drive drive.h5\n"
+    ),
+    "a run to tune by": Mistake(("tune", "run.h5"), 2, "got 'run.h5'", "leave it out; the file of a drive"),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"),
@@ -1036,14 +1160,18 @@ INSIDE = {
     ),
     "a column without a name": Mistake(
         ("import", "wide.csv", "--input", "", "--output", "Kraft", "-o", "out.h5"),
-        *(3, "wide.csv has no column ''; it has time, Spannung", "name one of these; "),
+        *(
+            3,
+            "wide.csv has no column ''; it has time, Spannung",
+            "name one of these, or give its number: 1 is the first\n",
+        ),
     ),
     "a unit that nobody knows": Mistake(
         (
             *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--output-unit", "furlong"),
             *("-o", "out.h5"),
         ),
-        *(3, "--output-unit 'furlong' is not a known unit", "give --output-unit, such as N"),
+        *(3, "--output-unit 'furlong' is not a known unit", "give a known unit, such as --output-unit N"),
     ),
     "nobody at the other side": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "socket://localhost:1"),
@@ -1071,7 +1199,11 @@ INSIDE = {
     ),
     "more bytes damaged than there are": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?wire=9"),
-        *(2, "must be the share of bytes to damage, from 0 to 0.1, got 9", "one byte in ten thousand"),
+        *(
+            2,
+            "must be the share of bytes to damage, from 0 to 0.1, got 9",
+            'ten thousand: --port "bench:?wire=0.0001"\n',
+        ),
     ),
     "answers that are no text": Mistake(
         (
@@ -1107,7 +1239,7 @@ _UNREADABLE = {
     ),
     "dates.csv": (
         *(_INVERT, "t,value\n2024-05-01,0\n2024-05-02,1\n2024-05-03,0\n"),
-        *("'2024-05-01' in line 2", "a date needs a time of day: 2024-05-01T00:00:00\n"),
+        *("'2024-05-01' in line 2", "write the time in seconds, or a date with its time"),
     ),
     "blank.csv": (_IMPORT, "t,I,F\n0,0,0\n1,,1\n", "has a blank cell in column I, line 3", "remove those"),
     "overload.csv": (_IMPORT, "t,I,F\n0,0,0\n1,1,9.9e37\n", "(an overload) in column F, line", "remove"),
@@ -1137,11 +1269,14 @@ _UNREADABLE = {
     "nothing.csv": (_CAPTURE, "", "nothing.csv is empty", "write two columns: t_s,current_A"),
     "shares.csv": (
         *(_INVERT, "time;value\n0;0\n0,3;50%\n0,6;100%\n0,8;0%\n"),
-        *("'50%' in column value, line 3: not a number", "write the numbers without %: 50, or"),
+        *("'50%' in column value, line 3: not a number", "write the numbers without %: 50\n"),
     ),
     "comma.csv": (
         *(_CAPTURE, "t_s,current_A\n0,0\n1,1,2\n2,0\n"),
-        *("has 3 columns in line 3", "if 1,2 is a decimal comma, write 1.2, or part the columns by"),
+        *(
+            "has 3 columns in line 3",
+            "if 1,2 is a decimal comma, write 1.2, or part the columns by semicolons\n",
+        ),
     ),
 }
 TABLES |= {name: text for name, (_, text, *_) in _UNREADABLE.items()}

@@ -157,7 +157,7 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
         f"{text!r} in {where} is not a known unit" if where else f"{what} {text!r} is not a known unit",
         hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
         if near
-        else f"{remedy}give {what}, such as N or mm/s^2; 1 stands for a pure number, "
+        else f"{remedy}give a known unit, such as {what} N or mm/s^2; 1 stands for a pure number, "
         "% and ‰ for its hundredths and thousandths",
     )
 
@@ -172,14 +172,19 @@ def as_parameters(input_unit: str, output_unit: str) -> str:
     return f"`input_unit` {input_unit} `output_unit` {output_unit}"
 
 
-def units_alike(name: str, one: Run | Model, other_name: str, other: Run | Model) -> str:
-    """Say how two come to the same units, where those of one alone are known; else empty."""
+def units_alike(name: str, one: Run | Model, other_name: str, other: Run | Model, apart: str) -> str:
+    """Say how two come to the same units, where those of one alone are known; else empty.
+
+    ``apart`` is what to do with two of different devices.
+    """
     bare = [not set(map(shown, (each.input_unit, each.output_unit))) - {""} for each in (one, other)]
     if bare[0] == bare[1]:
         return ""
     known, lacks, noun = (other, name, one) if bare[0] else (one, other_name, other)
     anew = f"import the table of {lacks} again with {as_parameters(known.input_unit, known.output_unit)}"
-    return f"of one device, {anew}{', and identify it again' * (noun.kind == 'model')}"
+    anew += ", and identify it again" * (noun.kind == "model")
+    same = f"if both are of one device, and the numbers of that table are in {units_of(known)}"
+    return f"{same}: {anew}; otherwise {apart}"
 
 
 def _with_micro(unit: str) -> str:

@@ -11,7 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.next_step import with_files
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, in_words
 from pulsetrainer.files.input_file import likely_kind
 
 
@@ -33,10 +33,11 @@ def extend(
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
     job = Job(context, inputs=(diagnosis, model, verify), outputs=(out,))
-    if verify is not None and likely_kind(verify) == "model":
+    kind = "" if verify is None else likely_kind(verify)
+    if kind not in ("", "run") and likely_kind(diagnosis) in ("", "diagnosis"):  # else that is told first
         raise DataError(
-            f"{verify} (--verify) is a model, expected a run",
-            hint="give one that served neither it nor the diagnosis",
+            f"{verify} (--verify) is a {in_words([kind])}, expected a run",
+            hint=f"give a run that was used neither to identify {model} nor for the diagnosis",
         )
     from pulsetrainer.files import provenance, store
     from pulsetrainer.report import diagnosis_results, facts

@@ -73,27 +73,25 @@ def import_(
     even = word_or_number(resample, "even", "--resample", must, **_RATES_HZ)
     jobs = [Job(context, tables=group, outputs=(target,)) for target, group in groups.items()]
     check_timing(time_column, rate, no_time=no_time, resampled=even is not None)
-    from pulsetrainer.files.run_from_table import run_from_table
+    from pulsetrainer.files.run_from_table import runs_from_tables
     from pulsetrainer.steps.import_ import import_parts
 
     read: list[tuple[Imported, Mapping[str, str]]] = []
     with jobs[0].working(f"reading {', '.join(path.name for path in files)}") as progress:
+        tables = runs_from_tables(
+            files,
+            input=input_column,
+            output=output_column,
+            time=time_column,
+            reference=reference_column,
+            input_unit=input_unit,
+            output_unit=output_unit,
+            rate_Hz=rate,
+            no_time=no_time,
+            skip_bad_rows=skip_bad_rows,
+        )
         for group in groups.values():
-            parts = [
-                run_from_table(
-                    path,
-                    input=input_column,
-                    output=output_column,
-                    time=time_column,
-                    reference=reference_column,
-                    input_unit=input_unit,
-                    output_unit=output_unit,
-                    rate_Hz=rate,
-                    no_time=no_time,
-                    skip_bad_rows=skip_bad_rows,
-                )
-                for path in group
-            ]
+            parts = [next(tables) for _ in group]  # the groups are in the order of the files
             jobs[0].notes([note for part in parts for note in part.notes])
             read.append((import_parts([part.run for part in parts], resample=even), parts[0].read_as))
             del parts

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-# what is often given as an argument to a command that has none of that kind
-INSTEAD = {
-    "session": "pulses are separated by commas, a model is an option: --pulses normal,bifid --model model.h5",
-    "check": "-o names the file that --update writes: pulsetrainer check model.h5 --update -o {extra}",
-    "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
-    "ports": "to look at one: pulsetrainer doctor --port {extra}",
-    "correct": "a diagnosis is an option: --diagnosis {extra}",
-    "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
-    "invert": "one pulse at a time: run it once for each, with an output of its own",
-    "capture": "one signal at a time: run it once for each, with an output of its own",
-    "play": "one drive at a time; a drive already holds what is needed of its model",
+# of a word too many, by the command and the kind of file, if it is one: what else there is to do
+BEHIND = {
+    "": "to look into a file: pulsetrainer show {extra}",
+    "session waveform": "a session makes its own drives; to play one: pulsetrainer play {extra} -o played.h5",
+    "check run": "to test a model on a run: pulsetrainer evaluate {extra} --model model.h5",
+    "tune": "the file of a drive is an option: --drive drive.h5",
+    "ports": "to look at one port: pulsetrainer doctor --port {port}",
+    "invert": "if it is another pulse: one at a time, each with an output of its own",
+    "capture": "if it is another signal: one at a time, each with an output of its own",
+    "play model": "a drive already holds what is needed of its model",
+    "FILE.h5": "one file at a time, its name in quotes if it has spaces; to compare evaluations or "
+    "sessions: pulsetrainer compare a.h5 b.h5",
 }
-# of them, those that are no file's name
-NO_FILE = {"ports", "doctor"}
-SWITCHED = ("yes", "no", "true", "false", "on", "off")
+SWITCHED = ("yes", "no", "true", "false", "on", "off", "0", "1")
+OFF = ("no", "false", "off", "0")
 SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")  # that typer writes a completion for
 NO_COMMAND = {
     "version": "pulsetrainer --version",
@@ -25,7 +25,8 @@ NO_COMMAND = {
     "record": "pulsetrainer capture identification -o run.h5",
     "measure": "pulsetrainer capture identification -o run.h5",
     "fit": "pulsetrainer identify run.h5 -o model.h5",
-    "calibrate": "of a model: pulsetrainer capture identification -o run.h5; of a coil: pulsetrainer tune",
+    "calibrate": "to model the device: pulsetrainer capture identification -o run.h5, then "
+    "pulsetrainer identify run.h5 -o model.h5; to set the gains of the current control: pulsetrainer tune",
     "simulate": "the simulated device is the port bench:, which is the default: pulsetrainer capture --help",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
@@ -36,16 +37,18 @@ NO_OPTION = {
     "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
     "invert --amplitude": "the height of a drive is a force: --force-max, and --force-min",
     "ports --port": "to look at one: pulsetrainer doctor --port PORT",
-    "capture --force-max": "to limit the force: --limit-force {value}",
-    "session --force-max": "the height is --amplitude, in % of what the model reaches; to limit the force: "
-    "--limit-force {value}",
-    "play --html": "evaluate writes it: pulsetrainer evaluate played.h5 --html {value}",
-    "identify --html": "diagnose writes it: pulsetrainer diagnose run.h5 --model model.h5 -o diagnosis.h5 "
-    "--html {value}; for a figure: pulsetrainer plot model.h5",
+    "capture --force-max": "a capture sets the current, not the force: for less force a lower --current-max; "
+    "--limit-force only stops it above a force",
+    "session --force-max": "the height is --amplitude, in % of what the model reaches",
+    "play --html": "evaluate writes it: pulsetrainer evaluate {out} --html {value}",
+    "identify --html": "diagnose writes it: pulsetrainer diagnose run.h5 --model {out} -o diagnosis.h5 "
+    "--html {value}; for a figure: pulsetrainer plot {out}",
     "show -o": "to write a table: pulsetrainer export model.h5 -o model.csv",
     "show --out": "to write a table: pulsetrainer export model.h5 -o model.csv",
     "invert --rate": "a pulse has its own rate; in a session: pulsetrainer session --rate {value}",
     "import --delimiter": "leave it out: the delimiter is recognised",
+    "--force-max": "the height is that of the drive: pulsetrainer invert normal --model model.h5 -o drive.h5 "
+    "--force-max {value}",
     "--version": "pulsetrainer --version",
     "--port": "leave it out: the command works on files, and needs no device",
     "import --time-unit": "write the unit in the heading of the table, such as 't [ms]', or give --rate",

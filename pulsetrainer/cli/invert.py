@@ -29,7 +29,8 @@ def invert(
         Option(help="Force at the foot of the pulse, N or the output's unit; default: the lowest."),
     ] = None,
     force_max: Annotated[
-        float | None, Option(help="Force at its top, N or the output's unit; default: the highest.")
+        float | None,
+        Option(help="Force at the top of the pulse, N or the output's unit; default: the model's highest."),
     ] = None,
     beat: Annotated[
         str | None,

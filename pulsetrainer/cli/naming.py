@@ -17,7 +17,7 @@ from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import HOLDS, as_options, next_step, the_other_way, to_make, with_files
 from pulsetrainer.cli.values import check_finite, named, set_by
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError, in_words
-from pulsetrainer.files.input_file import cut_off, is_sound, near_names, spaced
+from pulsetrainer.files.input_file import apart, cut_off, in_quotes, is_sound, near_names
 from pulsetrainer.files.pulses import library
 
 # of commands that take a run: what to do instead of making one in the usual way
@@ -55,13 +55,13 @@ class Command(TyperCommand):
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
         once = [one for one in options if one.type.name == "path" or one.name == "port" or one.secondary_opts]
         for twice, times in Counter(once).items():
-            if times > 1:
-                ways = " or ".join((twice.opts[-1], *twice.secondary_opts))
-                takes = (
-                    "file" if twice.type.name == "path" else "port" if twice.name == "port" else "of the two"
-                )
+            if twice.secondary_opts and {*(both := [twice.opts[-1], *twice.secondary_opts])} <= {*args}:
+                said = f"{' and '.join(both)} were both given, and are opposites"
+                raise UsageError(said, hint="give one of the two, or neither")
+            if times > 1 and not twice.secondary_opts:
+                takes = "port" if twice.name == "port" else "file"
                 raise UsageError(
-                    f"{ways} was given {times} times, and takes one {takes}",
+                    f"{twice.opts[-1]} was given {times} times, and takes one {takes}",
                     hint="give it once, or run the command once for each",
                 )
         for one in self.params:
@@ -174,7 +174,10 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
     error.message = re.sub(r"^(\w+):/(?=\w)", r"\1://", error.message)  # of an address a path keeps one slash
-    if hint := _for_a_pulse(error.path, name, context):
+    values = context.params.get(name)
+    listed = list(map(str, values)) if isinstance(values, list | tuple) else []
+    hint = _for_a_pulse(error.path, name, context) or in_quotes(listed, command)
+    if hint := hint or apart(error.path, option, several=given.multiple or given.nargs == -1):
         error.hint = hint
         return
     if isinstance(error, AbsentError) and name in _TABLES:
@@ -185,13 +188,9 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         return
     if isinstance(error, ExistsError) and command == "capture":
         error.hint = f"{next_step(error)}; --resume continues an interrupted recording"
-    values = context.params.get(name)
-    if isinstance(values, list | tuple) and (meant := spaced([str(one) for one in values])):
-        error.hint = f"put a name with spaces in quotes: {meant}"
-        return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
-    if hint := _several(error.path, given, option) or cut_off(error.path):
+    if hint := cut_off(error.path):
         error.hint = hint
         return
     where = "here" if folder == Path() else f"in {folder}"
@@ -214,13 +213,3 @@ def _for_a_pulse(path: Path, name: str, context: typer.Context) -> str:
         return ""
     model = context.params.get("waveform") or "model.h5"  # of invert: the two were exchanged
     return f"{path} is a pulse: pulsetrainer invert {path} --model {shlex.quote(model)} -o drive.h5"
-
-
-def _several(path: Path, given: Any, option: str) -> str:
-    """Say how several files are given where they were written as one, with commas between them."""
-    files = [Path(name) for name in str(path).split(",")]
-    if len(files) < 2 or not all(file.is_file() for file in files):
-        return ""
-    if not given.multiple and given.nargs != -1:
-        return "name one file"
-    return "name them one by one: " + " ".join(f"{option} {shlex.quote(str(file))}".strip() for file in files)

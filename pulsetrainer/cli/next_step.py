@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from pulsetrainer import errors
-from pulsetrainer.files.input_file import likely_kind, near_names
+from pulsetrainer.files.input_file import TABLES, likely_kind, near_names, to_import
 from pulsetrainer.files.output_name import free
-
-_TABLES = (".csv", ".tsv", ".txt", ".dat")
 
 MAKES = {
     "run": "pulsetrainer capture identification -o run.h5",
@@ -62,10 +60,8 @@ def next_step(problem: errors.PulsetrainerError) -> str:
         how = f"with `{to_make(problem.artefact, problem.path)} --overwrite`" if known else ""
         return f"restore it from a copy, or make it again {how or '(see pulsetrainer --help)'}"
     if isinstance(problem, errors.NotAnArtefactError) and not problem.foreign:
-        if problem.path.suffix.lower() in _TABLES:
-            table = shlex.quote(str(problem.path))
-            columns = "--input COLUMN --output COLUMN"
-            return f"import the table first: pulsetrainer import {table} {columns} -o run.h5"
+        if problem.path.suffix.lower() in TABLES:
+            return to_import(problem.path)
         elsewhere = "to read a recording from elsewhere, use `pulsetrainer import`"
         return f"give a file that pulsetrainer wrote; {elsewhere}"
     return problem.hint

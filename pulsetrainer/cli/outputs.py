@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import suppress
 from os.path import realpath  # a link to itself is refused when it is read
@@ -10,7 +11,7 @@ from pathlib import Path
 import typer
 
 from pulsetrainer.errors import EndingError, UsageError
-from pulsetrainer.files.output_name import FORMATS, check_artefact_name, is_no_file
+from pulsetrainer.files.output_name import FORMATS, check_artefact_name, free, is_no_file
 
 _IN_PLACE = {"refine"}  # what it writes takes the place of what it was given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
@@ -19,13 +20,14 @@ _FIGURES = ("png", "svg", "pdf")
 
 def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
     """Refuse an output that is an input of the command as well: it would be lost."""
-    if context.info_name in _IN_PLACE:
-        return
-    for path in outputs:
+    in_place = context.info_name in _IN_PLACE
+    for path in () if in_place and context.params["overwrite"] else outputs:
         if any(realpath(path) == realpath(given) for given in inputs):
             raise UsageError(
-                f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
-                hint="name another file",
+                f"{path} is what {context.info_name} works on and would be lost"
+                + ": it cannot be the output" * (not in_place),
+                hint=f"name another file, such as {shlex.quote(str(free(path)))}"
+                + ", or give --overwrite to replace it" * in_place,
             )
 
 

@@ -11,11 +11,7 @@ from pulsetrainer.cli.options import AnyFile, AsJson
 from pulsetrainer.report.tables import picked
 
 
-def show(
-    context: Context,
-    file: AnyFile,
-    json: AsJson = False,
-) -> None:
+def show(context: Context, file: AnyFile, json: AsJson = False) -> None:
     """Show what is in a file.
 
     Its kind, its main figures, and the commands that made it.

@@ -16,7 +16,6 @@ from pulsetrainer.cli.outputs import check_ending
 if TYPE_CHECKING:
     from pulsetrainer.steps.tune import Tuned
 
-
 _FOLLOWED = ("normal", "bifid")  # where no drive is given
 
 

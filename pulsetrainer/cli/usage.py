@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pulsetrainer.cli.instead import INSTEAD, NO_COMMAND, NO_FILE, NO_OPTION, SHELLS, SWITCHED
+from pulsetrainer.cli.instead import BEHIND, NO_COMMAND, NO_OPTION, OFF, SHELLS, SWITCHED
+from pulsetrainer.cli.next_step import HOLDS
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
-from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.input_file import columns_of, likely_kind, spaced
+from pulsetrainer.errors import UsageError, in_words
+from pulsetrainer.files.input_file import in_quotes, likely_kind, name_columns
+from pulsetrainer.files.pulses import library
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -21,6 +23,8 @@ _EXAMPLES = {
     "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
 }
+_COLUMNS = ("input_column", "output_column")
+_PORT = re.compile(r"/dev/|COM\d|(bench|qemu|socket):|tty")
 _LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
@@ -37,15 +41,15 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
         given = _as_typed(str(getattr(error, "option_name", "")), words)
-        at = next((k for k, word in enumerate(words) if word.partition("=")[0] == given), len(words))
-        near, moved = _alike(given, context), _elsewhere(given, at, context, words)
+        near, moved = _alike(given, context), _elsewhere(given, context, words)
         hint = f"did you mean {' or '.join(near)}?" if near else help_
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
         known = NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")
-        known = moved or known.format(behind=behind, value=_value_of(at, words)).rstrip()
+        out = _value_of("-o", words) or "out.h5"
+        known = moved or known.format(behind=behind, value=_value_of(given, words), out=out).rstrip()
         if Path(given).is_file():
-            known = f"a name that begins with a dash: ./{given}"
+            known = f"if that is the name of a file, write ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -56,7 +60,7 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
         return UsageError(said, hint=_EXAMPLES.get(option, help_))
     return (
-        _with_or_without_value(error, context, help_)
+        _with_or_without_value(error, context, help_, words)
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None), words)
     )
@@ -70,10 +74,12 @@ def check_apart(words: Sequence[str]) -> None:
     typed = words[: words.index("--") if "--" in words else None]
     for word, behind in zip(typed, (*typed[1:], "FILE"), strict=False):
         if word.startswith(("-ou", "-o=")):
-            name = shlex.quote(word.partition("=")[2] or behind)
+            option, _, value = word.partition("=")
+            name = shlex.quote(value or behind)
+            column = "import" in words and option != "-o" and not name.endswith(".h5")
             raise UsageError(
-                f"there is no option {word}: give the file to write after -o and a space",
-                hint=f"for a column, two dashes: --output {name}" if "import" in words else f"-o {name}",
+                f"there is no option {word}" + ": give the file to write after -o and a space" * (not column),
+                hint=f"a long name has two dashes: -{option} {name}" if column else f"-o {name}",
             )
         if word.startswith(_LONG_DASHES) and not Path(word).exists():
             short = word.lstrip("".join(_LONG_DASHES))
@@ -86,15 +92,16 @@ def check_apart(words: Sequence[str]) -> None:
     if first in ("--show-completion", "--install-completion") and second:
         raise UsageError(
             f"{first} is for the shell it runs in and takes no value, got {second}",
-            hint=f"run it in {second}, or let it print: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
+            hint=f"run it in {second}, or print it: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
             if second in SHELLS
             else f"write {first} alone",
         )
 
 
-def _elsewhere(option: str, at: int, context: Any, words: Sequence[str]) -> str:
+def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
     """Return the line with an option on the side of the command that it belongs to; else empty."""
     commands = getattr(getattr(context, "command", None), "commands", {})
+    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
     if option == "--settings":
         end, side = at + 1 + ("=" not in words[at]), "before"
         line = [*(*words, "FILE")[at:end], *words[:at], *words[end:]]
@@ -105,8 +112,9 @@ def _elsewhere(option: str, at: int, context: Any, words: Sequence[str]) -> str:
     return f"put it {side} the command: {shlex.join(['pulsetrainer', *line])}" if line != [*words] else ""
 
 
-def _value_of(at: int, words: Sequence[str]) -> str:
-    """Return what was typed behind the option at that place, or in it after ``=``, as a shell takes it."""
+def _value_of(option: str, words: Sequence[str]) -> str:
+    """Return what was typed behind an option, or in it after ``=``, as a shell takes it."""
+    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
     value = "".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2])
     return value and shlex.quote(value)
 
@@ -133,31 +141,28 @@ def _alike(given: str, context: Any) -> list[str]:
 
 
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
-    example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
+    example = _EXAMPLE.search(context.command.help or "")
     like = example[1] if example else help_
-    said = f"{named(parameter)} is missing: {meaning_of(parameter)}"
-    given: list[Path] = (context.params.get("files") or []) if context is not None else []
-    if given and parameter.name in ("input_column", "output_column"):
-        try:
-            columns = columns_of(Path(given[0]))
-        except DataError as error:  # which weighs more than what is missing
-            return UsageError(f"{error.message}; and {said}", hint=error.hint)
-        if len(columns) > 1:
-            first, second = map(shlex.quote, (columns[1:3] if len(columns) > 2 else columns))
-            said += f"; {given[0]} has {', '.join(columns)}"
-            like = f"name two of them, such as --input {first} --output {second}"
-    typed = context.meta.get("pulsetrainer.cli.naming", ()) if context is not None else ()
+    lacks = [p for p in context.command.params if p.required and context.params.get(p.name) is None]
+    others = " and ".join(named(one) for one in lacks if one is not parameter)
+    also = f", and so {'are' if ' and ' in others else 'is'} {others}" if others else ""
+    said = f"{named(parameter)} is missing{also}: {meaning_of(parameter)}"
+    given: list[Path] = context.params.get("files") or []
+    if given and parameter.name in _COLUMNS:
+        options = {_COLUMNS.index(one.name): named(one) for one in lacks if one.name in _COLUMNS}
+        said, like = name_columns(Path(given[0]), options, said)
+    typed = context.meta.get("pulsetrainer.cli.naming", ())
     if parameter.name == "model" and (loose := [one for one in typed if likely_kind(Path(one)) == "model"]):
         like = f"a model is an option: --model {shlex.quote(loose[0])}"
     return UsageError(said, hint=like)
 
 
-def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageError:
+def _with_or_without_value(error: Exception, context: Any, help_: str, words: Sequence[str]) -> UsageError:
     """A value where none goes, or none where one does."""
     option = getattr(error, "option_name", "an option")
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
-        return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
+        return _for_a_switch(option, _value_of(option, words), params)
     one = next((one for one in params if option in one.opts), None)
     choices = ", ".join(getattr(getattr(one, "type", None), "choices", ()))
     meaning = f": one of {choices}" if choices else f": {meaning_of(one).partition(';')[0]}" if one else ""
@@ -167,10 +172,7 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
 def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
     """What has no words of its own here, but for one argument too many and a command that does not exist."""
     if extra := _EXTRA.match(said):
-        problem = _one_too_many(extra[1], command, parsed)
-        if meant := spaced(words):
-            problem.hint = f"put a name with spaces in quotes: {meant}"
-        return problem
+        return _one_too_many(extra[1], command, parsed, words)
     if unknown := _UNKNOWN.match(said):
         hint = _command_for(unknown[1], unknown[2], parsed, words)
         return UsageError(f"there is no command {unknown[1]!r}", hint=hint)
@@ -193,22 +195,43 @@ def _command_for(word: str, near: str, parsed: Any, words: Sequence[str]) -> str
     return f"did you mean {near}? All commands: pulsetrainer --help" if near else "pulsetrainer --help"
 
 
-def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
+def _one_too_many(extra: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
     """What stands behind the arguments that a command takes."""
-    taken = [named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
-    name = command.rpartition(" ")[2]
-    instead = INSTEAD.get(name, "{command} --help")
-    if name == "tune" and Path(extra).suffix == ".toml":
-        instead = "the file to write is an option: pulsetrainer tune -o {extra}"
-    if name in NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
-        instead = "leave it out; to look into a file: pulsetrainer show {extra}"
-    if name == "check" and Path(extra).exists():
-        instead = "one model at a time: run it once for each"
-    if extra.lower() in SWITCHED:
-        instead = "leave it out: a switch takes no value; some have an opposite, such as --no-condition"
-    beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
-    beside += "pulsetrainer compare a.h5 b.h5"
+    every = [extra] if extra in words else extra.split()
+    word, params, name = every[0], parsed.params, command.rpartition(" ")[2]
+    before = words[words.index(word) - 1] if word in words else ""
+    if word.lower() in SWITCHED and any(before in (*p.opts, *p.secondary_opts) for p in params):
+        return _for_a_switch(before, word, params)
+    taken = " and ".join(named(p) for p in params if not p.opts[0].startswith("-")) or "options"
     return UsageError(
-        f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
-        hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
+        f"{command} takes {taken} only, got {', '.join(map(repr, every))} as well",
+        hint=in_quotes(words, name) or _meant_by(word, (name, taken), params, words),
     )
+
+
+def _meant_by(word: str, of: tuple[str, str], params: Sequence[Any], words: Sequence[str]) -> str:
+    """What to do with a word too many: what it is tells what it was meant for."""
+    kind, quoted, typed = likely_kind(Path(word)), shlex.quote(word), {one.partition("=")[0] for one in words}
+    taken = {one.opts[0]: HOLDS.get(one.name, ()) for one in params if not typed & {*one.opts}}
+    unknown, port = not kind and word.endswith(".h5"), quoted if _PORT.match(word) else "PORT"
+    option = next((o for o in taken if o[0] == "-" and (kind in taken[o] or (unknown and taken[o]))), "")
+    to_write = word.endswith(".toml") if of[0] == "tune" else "--update" in typed and not Path(word).exists()
+    pulses = ",".join(filter(None, (_value_of("--pulses", words), word)))
+    also = next(filter(None, map(BEHIND.get, (f"{of[0]} {kind}", *of, "" if kind else "-"))), "")
+    ways = {
+        f"a {in_words(taken.get(option, ()))} is an option: {option} {quoted}": option,
+        f"a port is an option: --port {port}": "--port" in taken and port == quoted,
+        f"pulses are an option: --pulses {pulses}": of[0] == "session" and {*word.split(",")} <= {*library()},
+        f"the file to write is an option: -o {quoted}": "-o" in taken and to_write,
+        f"one {in_words([kind])} at a time: run it once for each": any(kind in one for one in taken.values()),
+        f"leave it out{also and '; '}{also.format(extra=quoted, port=port)}": True,
+    }
+    return next(way for way, fits in ways.items() if fits)
+
+
+def _for_a_switch(option: str, value: str, params: Sequence[Any]) -> UsageError:
+    """A word such as yes or no behind an option that is on where it is given."""
+    off = [one.secondary_opts[-1:] for one in params if option in one.opts and value.lower() in OFF]
+    ways = [f"to switch it off: {other[0]}" if other else f"leave {option} out" for other in off]
+    said = f"{option} is a switch and takes no value, got {value!r}"
+    return UsageError(said, hint=(*ways, f"write {option} alone")[0])

@@ -67,9 +67,8 @@ def must_be(parameter: Any, error: Exception) -> str:
 
 def _within(parameter: Any) -> str:
     low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    return (
-        f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
-    )
+    least = "" if low is None else f", {low:g} or more"
+    return least if high is None else f" from {low:g} to {high:g}"
 
 
 def check_finite(context: Any) -> None:
@@ -99,7 +98,7 @@ def _as_a_number(parameter: Any, must: str) -> str:
         factor = _SECONDS[unit] / _SECONDS[said[1]]
         return f"write it in {said[1]}, without the unit: {float(number) * factor:g}"
     # what is typed in % must not be taken for N
-    return f"write it without a unit, and not in {unit}; {named(parameter)} is: {meaning_of(parameter)}"
+    return f"give it in its own unit, not in {unit}; {named(parameter)}: {meaning_of(parameter)}"
 
 
 def _choice(parameter: Any, must: str, context: Any) -> str:

@@ -111,13 +111,15 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         )
     if number in {errno.ENOENT, errno.ENODEV, errno.ENXIO} or "FileNotFoundError" in text:
         present = ", ".join(p.device for p in list_ports()) or "none"
-        hint = "check the cable, then `pulsetrainer ports`"
+        hint, nor = "check the cable, then `pulsetrainer ports`", ""
         if os.name == "posix" and re.fullmatch("COM[0-9]+", port):
             hint = "COM ports are of Windows; `pulsetrainer ports` lists those of this computer"
-        elif port.startswith("tty"):
+        elif re.match(r"(tty|cu\.)\w", port) and Path("/dev", port).exists():
             hint = f"write its path: `port` /dev/{port}"
+        elif os.name == "posix" and re.match(r"(tty|cu\.)\w", port):
+            hint, nor = f"{hint}; give the whole path that it shows", f", nor /dev/{port}"
         return DeviceError(
-            f"there is no port {port} (ports here: {present})",
+            f"there is no port {port}{nor} (ports here: {present})",
             hint=f"{hint}; without a device use `port` bench:, over a network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:

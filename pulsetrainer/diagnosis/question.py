@@ -79,7 +79,7 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     if not same_units((run.input_unit, run.output_unit), (model.input_unit, model.output_unit)):
         raise DataError(
             f"{name} is in {units_of(run)}, but {model_name} was identified in {units_of(model)}",
-            hint=units_alike(name, run, model_name, model)
+            hint=units_alike(name, run, model_name, model, "give a model of the device of that run")
             or "use a model of the same device; in other units, convert the columns and import again",
         )
     if model.reading != "continuous":

@@ -11,7 +11,7 @@ from pathlib import Path
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.settings import leaves, read_toml
 
-_HOW = "write one line for each figure, such as: normal.continuous.mean_error_reduction_percent = [90, 100]"
+_HOW = 'write one line for each figure, such as: "normal.continuous.mean_error_reduction_percent" = [90, 100]'
 
 
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:

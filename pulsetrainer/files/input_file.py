@@ -10,7 +10,7 @@ import glob
 import os
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -26,6 +26,8 @@ from pulsetrainer.files.checksum import is_as_written
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _END = {0: 40, 1: 44, 2: 28, 3: 28}  # byte at which an HDF5 file says its length, by its version
+TABLES = (".csv", ".tsv", ".txt", ".dat")
+_TAKE_TABLES = ("import", "capture", "invert")  # commands
 JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
 _FIRST_TEXT = re.compile(rb"GCOL.{28}([a-z]+)", re.DOTALL)  # our first text attribute is the kind
 
@@ -201,10 +203,35 @@ def likely_kind(path: Path) -> str:
     return found[1].decode() if found else ""
 
 
-def spaced(words: Sequence[str]) -> str:
-    """Return the file whose name has spaces in it and was typed without quotes, in quotes; else empty."""
+def in_quotes(words: Sequence[str], command: str) -> str:
+    """Say how the file is given whose name has spaces in it and was typed without quotes; else empty."""
     runs = (" ".join(words[i:j]) for i in range(len(words)) for j in range(i + 2, len(words) + 1))
-    return next((shlex.quote(run) for run in runs if Path(run).is_file()), "")
+    meant = next((Path(run) for run in runs if Path(run).is_file()), None)
+    if meant is None:
+        return ""
+    first = meant.suffix.lower() in TABLES and command not in _TAKE_TABLES
+    return "put a name with spaces in quotes" + (
+        f", and {to_import(meant)}" if first else f": {shlex.quote(str(meant))}"
+    )
+
+
+def to_import(table: Path) -> str:
+    """Say what is done with a table where an artefact is expected."""
+    line = f"pulsetrainer import {shlex.quote(str(table))} --input COLUMN --output COLUMN -o run.h5"
+    return f"import the table first: {line}"
+
+
+def apart(path: Path, option: str, *, several: bool) -> str:
+    """Say how files are given that were written as one, with commas between them; empty where none were.
+
+    Each behind an ``option`` of its own, if there is one; ``several``: more than one is taken.
+    """
+    files = list(dict.fromkeys(map(Path, str(path).split(","))))
+    if "," not in str(path) or not all(file.is_file() for file in files):
+        return ""
+    how = "name them one by one" if len(files) > 1 else "name each file once"
+    each = " ".join(f"{option} {shlex.quote(str(file))}".strip() for file in files)
+    return f"{how}: {each}" if several else "name one file"
 
 
 def columns_of(table: Path) -> tuple[str, ...]:
@@ -215,6 +242,22 @@ def columns_of(table: Path) -> tuple[str, ...]:
 
     reads = reader_of(table)
     return tuple(reads(table).values) if reads else detect(table).names
+
+
+def name_columns(table: Path, options: Mapping[int, str], missing: str) -> tuple[str, str]:
+    """Return what to say where options that name columns are ``missing``, and what to type.
+
+    ``options``: 0 is that of the input, 1 that of the output. That a table cannot be read weighs more.
+    """
+    try:
+        columns = columns_of(table)
+        said, like = f"{missing}; {table} has {', '.join(columns)}", "name one for each, "
+    except DataError as error:
+        columns = ("1", "2", "3")
+        said, like = f"{error.message}; and {missing}", f"{error.hint}; and name the columns, "
+    usual = columns[1:3] if len(columns) > 2 else columns
+    named = " ".join(f"{options[k]} {shlex.quote(one)}" for k, one in enumerate(usual) if k in options)
+    return said, f"{like}such as {named}" if named else "give a table with a column for each quantity"
 
 
 def check_resumable(path: Path) -> None:

@@ -5,11 +5,11 @@ What was left out or taken for granted is in the notes. Where the time comes fro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,23 @@ class TableRun(NamedTuple):
     run: Run
     notes: tuple[str, ...]
     read_as: Mapping[str, str]  # which columns were taken for what, and how a text is laid out
+
+
+def runs_from_tables(paths: Sequence[Path | str], **how: Any) -> Iterator[TableRun]:
+    """Read runs out of files, one after the other, each as ``run_from_table``.
+
+    DataError as it; where a later file has other headings, a column is better named by its number.
+    """
+    for number, path in enumerate(paths):
+        try:
+            yield run_from_table(path, **how)
+        except DataError as error:
+            if number and " has no column " in error.message:
+                error.hint = (
+                    "the headings of the files differ: give the column by its number, counted from 1, if it "
+                    "is the same in all, or import the files one by one"
+                )
+            raise
 
 
 def run_from_table(

@@ -91,7 +91,7 @@ def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, 
 
     if not path.stat().st_size:
         raise DataError(f"{path} is empty", hint=f"write two columns: {names}")
-    table = read_table(path, lambda head: range(min(2, len(head.names))), remedy="write the table again")
+    table = read_table(path, lambda head: range(min(2, len(head.names))), remedy="")
     if len(table.names) < 2:
         raise DataError(f"{path} has {len(table.names)} column; {what}", hint=f"write two columns: {names}")
     return table, seconds(table, table.names[0]), table.check_finite(table.names[1])

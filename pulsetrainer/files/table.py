@@ -37,7 +37,7 @@ _WRITTEN_ROWS = 1 << 14
 _NAMED = 5  # bad rows
 _MOST_BAD = 0.99  # of the rows: with more of them bad, the table is not what it was taken for
 _WITH_UNIT = re.compile(r"[-+]?\d[\d.,]*\s*([^\d\s.,].*)")  # a cell
-_ONE_OF_THESE = "name one of these; where the headings of several files differ, by its number: 1 is the first"
+_ONE_OF_THESE = "name one of these, or give its number: 1 is the first"
 _AGAIN = "export the recording again"
 
 
@@ -249,7 +249,8 @@ def read_table(
 
     ``keep`` gets the table without its numbers and returns the places of the columns that are to stay in
     memory; all by default. With ``bad_rows`` a row of too few or too many cells, or with text in a column of
-    numbers, lacks numbers; without, ``remedy`` is what may be done but removing such rows.
+    numbers, lacks numbers; without, ``remedy`` is what may be done but removing such rows,
+    if anything.
 
     DataError where the file cannot be read, is empty or no table, has bad rows, or two decimal signs (line
     and column are named).
@@ -282,12 +283,13 @@ def read_table(
         if bad.size and bad[0] == table.rows - 1 and end_of(path, dialect.encoding).endswith("\0"):
             raise DataError(
                 f"{path} ends in zero bytes, in {table.place(table.rows - 1)}: the recorder stopped there",
-                hint=f"cut the file after line {table.line_of(table.rows - 1) - 1}, or {remedy}",
+                hint=f"cut the file after line {table.line_of(table.rows - 1) - 1}"
+                + (remedy and f", or {remedy}"),
             )
         mend = rows.remedy or f"correct or remove {'that line' if bad.size == 1 else 'those lines'}"
         raise DataError(
             f"{rows.misfit} ({_lacking(bad.size, table.rows)}: {table.places(bad)})",
-            hint=f"{mend}, or {_AGAIN if table.mostly(bad) else remedy}",
+            hint=mend + (remedy and f", or {_AGAIN if table.mostly(bad) else remedy}"),
         )
     return table
 

@@ -158,13 +158,18 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     name = table.heading(name)
     unit = unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
-        below = not split_unit(table.heading(name))[1] and name in table.units
+        expected = "expected s, ms, us, ns, min, h or d"
+        other = ", choose another `time` column, or give a `rate_Hz`" * of_record
+        if not split_unit(table.heading(name))[1] and name in table.units:
+            raise DataError(
+                f"{unit!r} in the line below the heading {name!r} of {table.path} was taken for the unit "
+                f"of the time, and is none: {expected}",
+                hint="if that line holds headings again, delete it; if it holds the units, correct this one"
+                + other,
+            )
         raise DataError(
-            f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
-            "or d" + ": the line below the headings was taken for units" * below,
-            hint="keep one line of headings, or " * below
-            + "convert it to seconds"
-            + ", choose another `time` column, or give a `rate_Hz`" * of_record,
+            f"the time {column_words(name)} of {table.path} is in {unit!r}, {expected}",
+            hint=f"convert it to seconds{other}",
         )
     stamps = table.check_finite(name, remedy=LEAVE_OUT) if of_record else table.check_finite(name)
     time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]

@@ -62,7 +62,8 @@ def how_to_write(cell: str) -> str:
     """Say how minutes and seconds, or a date alone, are written so that they are read; empty: other text."""
     if _SHORT.fullmatch(cell):
         return "write minutes and seconds with the hour, 0:00:05, or in seconds, 5"
-    return "a date needs a time of day: 2024-05-01T00:00:00" if _DATE.fullmatch(cell) else ""
+    dated = "write the time in seconds, or a date with its time of day, 2024-05-01T00:00:00"
+    return dated if _DATE.fullmatch(cell) else ""
 
 
 def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:

@@ -22,7 +22,8 @@ BREAKS = (
 )  # fmt: skip
 # What of the plant the emulated device takes, with its ranges: in the order of port/mps2/board.c; a test
 # compares them with what the firmware lists.
-QEMU_SETTINGS = {"ambient": (-60.0, 80.0), "supply-sag": (0.0, 5.0), "coil": (0.0, 16777215.0)}
+_MOST_SEED = 16777215.0
+QEMU_SETTINGS = {"ambient": (-60.0, 80.0), "supply-sag": (0.0, 5.0), "coil": (0.0, _MOST_SEED)}
 LONGEST_S = 1e5
 MAX_RATE = 0.1  # of damaged bytes: beyond that no frame comes through
 _SPEEDS = ("max", "steady", "real")
@@ -37,20 +38,21 @@ class Wire:
 
     def told(self, kind: str, name: str, text: str) -> Wire:
         """Return the wire with the parameter ``name=text`` of a ``kind:`` port; UsageError if it is none."""
-        like = f'`port` "{kind}:?wire=0.0001&wire-seed=3"'
+        like = f'`port` "{kind}:?wire=0.0001'
         if name == "wire-seed":
             if re.fullmatch(r"\d{1,9}", text):
                 return replace(self, seed=int(text))
             raise UsageError(
-                f"`port`: the {kind} parameter wire-seed must be a whole number, 0 or more, got {text}",
-                hint=like,
+                f"`port`: the {kind} parameter wire-seed must be a whole number of up to nine digits, "
+                f"got {text}",
+                hint=f'{like}&wire-seed=3"',
             )
         rate = number_in(text, 0.0, MAX_RATE)
         if math.isnan(rate):
             raise UsageError(
                 f"`port`: the {kind} parameter wire must be the share of bytes to damage, from 0 to "
                 f"{MAX_RATE}, got {text}",
-                hint=f"to damage one byte in ten thousand: {like}",
+                hint=f'to damage one byte in ten thousand: {like}"',
             )
         return replace(self, rate=rate)
 
@@ -110,11 +112,11 @@ def _switch(text: str) -> bool:
     return text != "0"
 
 
-def _number_of_device(text: str, name: str = "serial") -> str:
+def _number_of_device(text: str, name: str = "serial", within: str = " of up to eight digits") -> str:
     if not re.fullmatch(r"\d{1,8}", text):
         raise UsageError(
-            f"`port`: the bench parameter {name}={text} is not a whole number of up to eight digits",
-            hint='`port` "bench:?seed=4&serial=3"',
+            f"`port`: the bench parameter {name} must be a whole number{within}, got {text}",
+            hint=f'`port` "bench:?{name}=3"',
         )
     return text
 
@@ -159,7 +161,7 @@ def parse_bench(port: str) -> BenchOptions:
             asked = replace(asked, serial=_number_of_device(value))
         else:
             if name == "seed" and re.fullmatch(r"\d+\.\d*", value):
-                _number_of_device(value, "seed")
+                _number_of_device(value, "seed", f" from 0 to {_MOST_SEED:.0f}")
             asked = replace(asked, settings=(*asked.settings, (name, value)))
     return asked
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
@@ -227,15 +228,18 @@ def check_measured(names: Sequence[str], given: Sequence[Any], models: Sequence[
         raise UsageError(
             "evaluate takes playbacks, or one run together with the models to test on it, or one session; "
             f"got {', '.join(got) or 'nothing'}",
-            hint=_for_sessions(
-                [name for name, one in zip(names, given, strict=True) if one.kind == "session"]
-            )
-            or "pulsetrainer evaluate run.h5 --model model.h5",
+            hint=_one_by_one([(shlex.quote(name), one.kind) for name, one in zip(names, given, strict=True)]),
         )
 
 
-def _for_sessions(names: Sequence[str]) -> str:
-    """Say what is done with the sessions of these names; empty where there are none."""
-    if len(names) > 1:
-        return f"one session at a time; to see them side by side: pulsetrainer compare {' '.join(names)}"
-    return f"one session at a time and nothing with it: {names[0]} alone" if names else ""
+def _one_by_one(given: Sequence[tuple[str, str]]) -> str:
+    """Say how files are evaluated, each kind by itself: ``given`` are their names and kinds."""
+    playbacks, runs, sessions = (
+        [name for name, kind in given if kind == wanted] for wanted in ("playback", "run", "session")
+    )
+    if len(sessions) > 1:
+        return f"one session at a time; to see them side by side: pulsetrainer compare {' '.join(sessions)}"
+    ways = [*sessions, *([" ".join(playbacks)] if playbacks else [])]
+    ways += [f"{run} --model model.h5" for run in runs or (() if ways else ("run.h5",))]
+    several = "each by itself: " if len(ways) > 1 else ""
+    return several + ", and ".join(f"pulsetrainer evaluate {way}" for way in ways)

@@ -164,7 +164,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
                 f"{title} was identified in {units_of(model)}, but {name} is in {units_of(run)}",
-                hint=units_alike(title, model, name, run)
+                hint=units_alike(title, model, name, run, "give a model of the device of that run")
                 or "use a model of the same device; in other units, convert the columns and import again",
             )
     parts, first_strokes = _parts(name, run, models)

@@ -199,7 +199,7 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
-                hint=units_alike(name, run, names[0], first)
+                hint=units_alike(name, run, names[0], first, "identify the runs one by one")
                 or "identify runs of different devices one by one; of one device, convert the columns of "
                 "the tables and import them again",
             )

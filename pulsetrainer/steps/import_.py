@@ -238,8 +238,10 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
         count = np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9) + 1
     if not 2 <= count <= MOST_SAMPLES:
         raise UsageError(
-            f"`resample` to steps of {step:.3g} s would make {count:.6g} samples of {run.input.size}",
-            hint="give `resample` even, for the rate that it has",
+            f"`resample` to {1.0 / step:.4g} Hz would make {count:.4g} sample{'' if count == 1 else 's'} out "
+            f"of the {run.input.size} of {run.signal}, expected from 2 to {MOST_SAMPLES:,}",
+            hint=(f"give a {'lower' if count > 2 else 'higher'} rate" if rate_Hz else "give a lower rate")
+            + ", or `resample` even for the median time step" * (rate_Hz is not None),
         )
     even = run.time_s[0] + np.arange(int(count)) * step
     measured = run.counts

@@ -106,6 +106,10 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert "identified from" not in done.err
     done = pulsetrainer(bench, *words, "slow.h5", "-o", "seen.h5")
     tells(done.err, "seen before")
+    done = pulsetrainer(bench, *words, "model.h5", "-o", "never.h5")  # by model.h5 nothing is verified
+    assert done.code == 3
+    assert "model.h5 (--verify) is a model, expected a run\n" in done.err
+    assert "used neither to identify model.h5 nor for the diagnosis" in done.json["error"]["hint"]
     done = pulsetrainer(bench, "evaluate", "diagnostic.h5", *models)  # which proves nothing
     assert "extended.h5 was made with diagnostic.h5" in done.err
     assert " model.h5 was made with" not in done.err

@@ -101,6 +101,20 @@ def test_a_busy_port_is_told_by_a_number_or_by_words(error):
     told(ports.cannot_open("/dev/ttyUSB0", error), "port is busy", port="/dev/ttyUSB0")
 
 
+def test_a_port_without_its_folder_is_offered_only_where_there_is_one(monkeypatch):
+    """Of one that is not there either, both names are told."""
+    monkeypatch.setattr(ports, "list_ports", list)
+    monkeypatch.setattr(ports.Path, "exists", lambda path: path == ports.Path("/dev/ttyUSB0"))
+    there, absent = (
+        ports.cannot_open(name, FileNotFoundError(errno.ENOENT, "No such file"))
+        for name in ("ttyUSB0", "ttyUSB1")
+    )
+    assert there.message == "there is no port ttyUSB0 (ports here: none)"
+    assert there.hint.startswith("write its path: `port` /dev/ttyUSB0; ")
+    assert absent.message == "there is no port ttyUSB1, nor /dev/ttyUSB1 (ports here: none)"
+    assert "write its path" not in absent.hint
+
+
 def test_a_busy_port_is_listed_as_busy(monkeypatch, wire):
     """The list says so without opening the port."""
     path = wire("bench:").bench.path

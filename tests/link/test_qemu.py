@@ -77,11 +77,11 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         (
             "qemu:?wire=1",
             "qemu parameter wire must be the share of bytes to damage, from 0 to 0.1, got 1",
-            "wire-seed",
+            '"qemu:?wire=0.0001"',
         ),
         (
             "qemu:?wire-seed=x",
-            "qemu parameter wire-seed must be a whole number, 0 or more, got x",
+            "qemu parameter wire-seed must be a whole number of up to nine digits, got x",
             "wire-seed",
         ),
     ],

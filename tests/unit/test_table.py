@@ -1012,7 +1012,7 @@ def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hin
 
 
 @pytest.mark.parametrize(
-    ("cell", "remedy"), [("0:0{}", "0:00:05, or in seconds"), ("2024-05-0{}", "needs a time of day")]
+    ("cell", "remedy"), [("0:0{}", "0:00:05, or in seconds"), ("2024-05-0{}", "a date with its time of day")]
 )
 def test_a_time_that_is_not_read_is_told_how_to_be_written(tmp_path, cell, remedy):
     """Not to be named as the time: it could not be read then either."""
