@@ -229,7 +229,7 @@ def test_a_gain_that_drifts_is_no_drift_of_the_zero(size):
     found = pt.diagnose([seen], model)
     assert ([one.cause for one in found.found], found.correctable) == (["gain-drift"], ("gain-drift",))
     known = {one.name: one.value for one in found.found[0].parameters}
-    assert known["gain"] == pytest.approx(size / seen.time_s[-1], rel=0.05)
+    assert known["gain"] == pytest.approx(size / seen.time_s[-1], rel=0.08)  # the weights hold some of it
     models = [model, pt.identify(pt.correct(seen, found)), pt.identify(calm)]
     drifting, corrected, sound = (one.rms_percent for one in pt.evaluate(unseen, models).models)
     assert 2.0 * sound < drifting
