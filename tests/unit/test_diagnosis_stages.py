@@ -91,6 +91,12 @@ def _score(name: str, gain: float, p: float = 0.005, basis=None) -> Score:
     return Score(CAUSE[name], gain, start, p, np.eye(3)[:, :1] if basis is None else basis)
 
 
+@pytest.fixture(autouse=True)
+def _no_several_steps(monkeypatch):
+    """They have tests of their own, on records: here no model is run."""
+    monkeypatch.setattr(joint_fit.several_steps, "fitted_with", lambda *_: None)
+
+
 class HeldOut:
     """Gains that are told, and errors on whole pieces, by the number of causes."""
 
@@ -340,6 +346,33 @@ def test_a_formula_comes_before_one_that_holds_it(monkeypatch, doubt, first):
     assert found.trials[0][1].cause.id == first
 
 
+@pytest.mark.parametrize(
+    ("p", "there", "squares", "first"),
+    [
+        (0.005, (), 30.0, "several"),
+        (0.005, (), 50.0, "creep"),
+        (0.02, (), 30.0, "creep"),  # a step is not significant
+        (0.005, ("offset-drift",), 30.0, "creep"),  # its family is there
+    ],
+)
+def test_several_steps_are_tried_where_a_step_is_promising(monkeypatch, p, there, squares, first):
+    """Beside all others, which they are told of, and sorted among them."""
+    asked = []
+
+    def fitted_with(state, step, others):
+        asked.append((step, [one.squares for one in others]))
+        return Fit(squares, (Term(step.several(2), (0.1, 0.0, 1.0, 0.1, 0.0, 2.0)),))
+
+    monkeypatch.setattr(joint_fit.several_steps, "fitted_with", fitted_with)
+    known = {frozenset({*there, "creep"}): 40.0, frozenset({*there, "step"}): 60.0}
+    _refitting(monkeypatch, joint_fit, squares=known)
+    scores = Screen((_score("creep", 100.0), _score("step", 90.0, p)))
+    found = joint_fit.stage(_state(_fit(500.0, *there), scores=scores))
+    (term,) = found.trials[0][0].terms[-1:]
+    assert ("several" if len(term.values) > 3 else term.cause.id) == first
+    assert asked == ([(CAUSE["step"], [40.0, 60.0])] if p < 0.01 and not there else [])
+
+
 def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
     """Scores are sorted: none behind it can be."""
     _refitting(monkeypatch, joint_fit, squares={frozenset({"creep"}): 1.0})
@@ -405,6 +438,17 @@ def test_a_hum_that_halves_do_not_predict_is_asked_of_whole_pieces(monkeypatch, 
     held_out = HeldOut(-1.0)
     held_out.gain_told = lambda before, after, floor: 0.9
     state = _state(_fit(500.0), held_out=held_out, trials=((_fit(400.0, name), _score(name, 1.0)),))
+    assert bool(acceptance.stage(state).current.terms) is taken
+
+
+@pytest.mark.parametrize(("count", "taken"), [(1, False), (2, True)])
+def test_several_steps_that_halves_do_not_predict_are_asked_of_whole_pieces(monkeypatch, count, taken):
+    """A half may lack what lies between two moments; of one step it has what comes before and after."""
+    _refitting(monkeypatch, acceptance, squares={frozenset({"step"}): 399.0})
+    held_out = HeldOut(-1.0)
+    held_out.gain_told = lambda before, after, floor: 0.9
+    trial = Fit(400.0, (Term(CAUSE["step"].several(count), count * (0.1, 0.0, 1.0)),))
+    state = _state(_fit(500.0), held_out=held_out, trials=((trial, _score("step", 1.0)),))
     assert bool(acceptance.stage(state).current.terms) is taken
 
 

@@ -88,7 +88,8 @@ class Step(Cause):
     @staticmethod
     def each(values: Values) -> list[Values]:
         """Offset, gain and moment of each change."""
-        return [values[k : k + 3] for k in range(0, len(values), 3)]
+        per = len(Step.parameters)
+        return [values[k : k + per] for k in range(0, len(values), per)]
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return offset, gain and moment, then those of each later moment, by its number."""
@@ -97,7 +98,7 @@ class Step(Cause):
 
     def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
         """Return all but the moments."""
-        return [one for k, one in enumerate(parameters) if k % 3 < self.strengths]
+        return [one for one in parameters if not one.name.startswith("time")]
 
     @cached_property
     def sharp(self) -> Cause:
