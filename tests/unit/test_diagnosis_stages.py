@@ -373,6 +373,17 @@ def test_several_steps_are_tried_where_a_step_is_promising(monkeypatch, p, there
     assert asked == ([(CAUSE["step"], [40.0, 60.0])] if p < 0.01 and not there else [])
 
 
+def test_a_formula_takes_no_place_beside_the_one_that_it_holds(monkeypatch):
+    """A drift of the gain scores as well as one of the zero whatever it is: the fourth is tried as well."""
+    names = ("accommodation", "gain-drift", "offset-drift", "creep", "viscous")
+    squares = {frozenset({name}): 100.0 + k for k, name in enumerate(names)}
+    asked = _refitting(monkeypatch, joint_fit, squares=squares)
+    monkeypatch.setattr(joint_fit, "doubt", lambda *_: 0.0)
+    scores = Screen(tuple(_score(name, 100.0 - k) for k, name in enumerate(names)))
+    joint_fit.stage(_state(_fit(500.0), scores=scores))
+    assert {name for (name,), *_ in asked} == set(names[:4])
+
+
 def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
     """Scores are sorted: none behind it can be."""
     _refitting(monkeypatch, joint_fit, squares={frozenset({"creep"}): 1.0})
@@ -1146,6 +1157,9 @@ def test_only_the_closest_three_are_tried(monkeypatch):
     found, asked = _rivals(monkeypatch, 400.0, scores=("delay", "creep", "step", "viscous"))
     assert found == ("delay", "creep", "step")
     assert len(asked) == 3
+    names = ("delay", "gain-drift", "offset-drift", "creep", "viscous")
+    found, _ = _rivals(monkeypatch, 400.0, scores=names)
+    assert found == names[:4]  # a formula and the one that it holds have one place
 
 
 def test_at_one_rate_all_that_widen_the_loop_are_one(monkeypatch):

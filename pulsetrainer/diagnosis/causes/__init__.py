@@ -35,6 +35,11 @@ def other_kinds(cause: Cause, frames: Sequence[Frame]) -> list[Cause]:
     return [one for one in known if one is not cause and len(one.quantities(frames[0])) == count]
 
 
+def places(causes: Collection[Cause]) -> int:
+    """Return how many causes these are, where one whose formula holds another counts with that one."""
+    return sum(not any(one.holds(other) for other in causes) for one in causes)
+
+
 def cause_named(name: str) -> Cause:
     """Return a cause.
 

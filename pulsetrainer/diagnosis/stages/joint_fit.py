@@ -3,10 +3,10 @@
 The weights have absorbed most of any effect, so a cause that is fitted to what they leave comes out too
 small. The three best candidates are therefore fitted jointly: the parameters of all causes and all weights at
 once. If the refit of a candidate lowers nothing (a lag, say, where the output leads), the next one takes its
-turn. A hum, which nothing else resembles, is tried in any case. If one of them is a lag, the other lags are
-tried too, starting from the same lateness: linearised from far away, lags hardly differ. If a step is
-significant, several steps are sought together, and tried where they leave less than half of what all other
-candidates do (decision 146).
+turn; a drift of the zero and one of the gain, whose formula holds it, have one place. A hum, which nothing
+else resembles, is tried in any case. If one of them is a lag, the other lags are tried too, starting from the
+same lateness: linearised from far away, lags hardly differ. If a step is significant, several steps are
+sought together, and tried where they leave less than half of what all other candidates do (decision 146).
 
 A candidate must be significant, and its linearised score at least half of what is relevant, since the score
 shows less than a refit does. A *family* is a group of causes that look alike, such as the lags. No candidate
@@ -21,7 +21,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pulsetrainer.diagnosis import several_steps
-from pulsetrainer.diagnosis.causes import other_kinds
+from pulsetrainer.diagnosis.causes import other_kinds, places
 from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.causes.step import Step
 from pulsetrainer.diagnosis.extended import Term
@@ -36,10 +36,10 @@ def stage(state: State) -> State:
     """Return the state with joint refits of the best candidates, the best fit first."""
     trials: list[tuple[Fitted, Score]] = []
     for score in state.scores.scores:
-        lower = [trial for trial, _ in trials if trial.squares < state.current.squares]
+        lower = [one.cause for trial, one in trials if trial.squares < state.current.squares]
         if not promising(state, score):
             break
-        if (len(lower) < LIMITS.tried or score.cause.line) and score.cause.family not in state.families:
+        if (places(lower) < LIMITS.tried or score.cause.line) and score.cause.family not in state.families:
             trials.append((_of_best_kind(state, score), score))
     trials += _as_late(state, trials)
     trials += _at_several_moments(state, trials)

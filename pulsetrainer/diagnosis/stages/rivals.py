@@ -41,7 +41,7 @@ import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wear
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, places
 from pulsetrainer.diagnosis.causes.accommodation import Accommodation
 from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
@@ -238,7 +238,9 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     found = []
     others = [score for score in ranked(without, fitted) if score.cause.id not in fitted.names]
     others = [score for score in others if not score.cause.holds(term.cause)]  # that would fit anyway
-    close = [score for score in others[: LIMITS.closest] if score.gain >= LIMITS.rival_screened * gain]
+    named = [score.cause for score in others]
+    most = max(k for k in range(len(others) + 1) if places(named[:k]) <= LIMITS.closest)
+    close = [score for score in others[:most] if score.gain >= LIMITS.rival_screened * gain]
     # linearised from afar, a lag of another kind may score nothing
     close += [score for score in others if both_late(score, term) and score not in close]
     late = max(margin, LIMITS.rival_late * structure)
