@@ -6,7 +6,7 @@ what they leave together, from the columns of the screen, of which all is projec
 do (orthogonal matching pursuit: Pati, Rezaiifar and Krishnaprasad, Asilomar Conf. on Signals, 1993). The
 search ends where one more would take away less than a fifth of what is left above the noise from sample to
 sample. Then all of them are refitted together, and those are dropped that are not needed. They are told only
-if they leave less than half of what every other candidate does: a few steps imitate much that is slow.
+if they leave less than a tenth of what every other candidate does: a few steps imitate much that is slow.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def fitted_with(state: State, step: Step, others: Sequence[Fitted]) -> Fitted | 
     trial = refit(state.problem, (*current.terms, _together(step, moments)), current)
     least = min(one.squares for one in (current, *others))
     for _ in moments[1:]:
-        if trial.squares - quick >= LIMITS.half * (least - quick):
+        if trial.squares - quick >= LIMITS.steps_leave * (least - quick):
             break
         fewer = refit(state.problem, _without_the_weakest(trial, step), trial)
         if fewer.squares - trial.squares > max(state.floor.relevant, trial.squares - quick):

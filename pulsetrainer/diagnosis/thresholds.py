@@ -125,6 +125,7 @@ class Thresholds:
     # Accepting a cause
     most_causes: int = 5  # at once: more were never right
     most_steps: int = 5  # at once: more pieces would follow anything slow
+    steps_leave: float = 0.1  # of what every other cause leaves above quick noise: false ones leave 0.29
     one_step: float = 0.2  # of what is left above quick noise: one step of several takes away more
     one_moment: float = 1.5  # distances between moments tried: nearer ones are the same step
     tried: int = 3  # candidates refitted in each round

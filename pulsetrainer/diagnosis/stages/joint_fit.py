@@ -6,7 +6,7 @@ once. If the refit of a candidate lowers nothing (a lag, say, where the output l
 turn; a drift of the zero and one of the gain, whose formula holds it, have one place. A hum, which nothing
 else resembles, is tried in any case. If one of them is a lag, the other lags are tried too, starting from the
 same lateness: linearised from far away, lags hardly differ. If a step is significant, several steps are
-sought together, and tried where they leave less than half of what all other candidates do (decision 146).
+sought together, and tried where they leave less than a tenth of what all other candidates do (decision 146).
 
 A candidate must be significant, and its linearised score at least half of what is relevant, since the score
 shows less than a refit does. A *family* is a group of causes that look alike, such as the lags. No candidate
