@@ -23,6 +23,7 @@ from pulsetrainer.device.plausibility import (
     judge_force,
     judge_repeat,
 )
+from pulsetrainer.device.trace import Trace
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.play import DRIVES, play
 
@@ -35,6 +36,16 @@ def _mixed(rng):
     return np.concatenate([signal(name, rng) for name in SIGNALS])
 
 
+def _in_time(port: str, reference: np.ndarray) -> Trace:
+    """Play on a device, three times at most where the computer was too busy to send the reference in time."""
+    for _ in range(3):
+        with open_device(port) as device:
+            trace = device.play(reference, 1000)
+        if not trace.underrun:
+            break
+    return trace
+
+
 # The thresholds were set on devices 1 to 10 and judged on 11 to 20: these are others.
 @pytest.mark.parametrize(
     "seed", [31, 32, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(33, 51))]
@@ -43,8 +54,7 @@ def test_a_healthy_force_is_never_doubted(seed):
     """Twenty drawn devices, each with noise as built and three times that: no false alarm."""
     reference = _mixed(np.random.default_rng(seed))
     for noise in (0.003, 0.009):
-        with open_device(f"bench:?seed={seed}&noise={noise}") as device:
-            trace = device.play(reference, 1000)
+        trace = _in_time(f"bench:?seed={seed}&noise={noise}", reference)
         assert trace.complete, trace.fault
 
 
