@@ -1146,6 +1146,12 @@ def test_a_formula_that_holds_the_cause_found_is_no_rival(monkeypatch):
     assert _rivals(monkeypatch, 400.0, scores=("offset-drift",), name="gain-drift")[0] == ("offset-drift",)
 
 
+@pytest.mark.parametrize(("squares", "found"), [(400.0, ()), (399.9, ("gain-drift",))])
+def test_a_formula_that_holds_another_is_a_rival_only_where_it_fits_better(monkeypatch, squares, found):
+    """A small heat of the as-built bench was in doubt with a drift that has one parameter more."""
+    assert _rivals(monkeypatch, squares, scores=("gain-drift",), name="thermal-drift")[0] == found
+
+
 @pytest.mark.parametrize(("creep", "found"), [(549.0, ("creep",)), (551.0, ())])
 def test_a_lag_as_quick_as_the_samples_may_be_a_creep(monkeypatch, creep, found):
     """Half a time step late: creep is asked about whatever it scored, and told as lags are."""
@@ -1158,7 +1164,7 @@ def test_only_the_closest_three_are_tried(monkeypatch):
     assert found == ("delay", "creep", "step")
     assert len(asked) == 3
     names = ("delay", "gain-drift", "offset-drift", "creep", "viscous")
-    found, _ = _rivals(monkeypatch, 400.0, scores=names)
+    found, _ = _rivals(monkeypatch, 399.0, scores=names)
     assert found == names[:4]  # a formula and the one that it holds have one place
 
 

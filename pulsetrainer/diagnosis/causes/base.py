@@ -223,8 +223,14 @@ class Cause:
         """The same without the last parameter of the finer one; None: this is no finer one."""
         return None
 
-    def holds(self, other: Cause) -> bool:
+    @property
+    def holds_another(self) -> bool:
         """Whether its formula is that of another cause, with one parameter more."""
+        coarser = self.coarser()
+        return coarser is not None and coarser.id != self.id
+
+    def holds(self, other: Cause) -> bool:
+        """Whether its formula is that of this other cause, with one parameter more."""
         coarser = self.coarser()
         return coarser is not None and coarser.id == other.id != self.id
 

@@ -3,10 +3,10 @@
 A name is unique only if no other cause fits as well in its place. The three causes that score best without it
 are fitted jointly, each in its place. A rival is named beside the cause found if noise, or what happens
 between two samples, could make the difference between the two fits. A cause whose formula holds that of the
-one found is no rival: it would fit anyway. On a record of one single rate all causes
-that widen the loop with the rate are named together: there they are just a wider loop. A creep and a lag as
-quick as the samples are tried in each other's place, whatever they score. Causes that equal loops showed have
-no rivals here: nothing else that is known makes equal loops differ.
+one found is no rival: it would fit anyway. One that holds that of a third must fit better. On a record of one
+single rate all causes that widen the loop with the rate are named together: there they are just a wider loop.
+A creep and a lag as quick as the samples are tried in each other's place, whatever they score. Causes that
+equal loops showed have no rivals here: nothing else that is known makes equal loops differ.
 
 What speaks against a cause that was found is written beside it:
 
@@ -252,7 +252,9 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
             continue
         terms = (*without.terms, one)
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + near)
-        if trial.squares - fitted.squares < max(near, doubt(fitted, trial, state.scores.noise)):
+        # what may do more, and explains no more, is no reason to doubt what does less
+        within = 0.0 if one.cause.holds_another else max(near, doubt(fitted, trial, state.scores.noise))
+        if trial.squares - fitted.squares < within:
             found.append(one.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
