@@ -37,7 +37,7 @@ def other_kinds(cause: Cause, frames: Sequence[Frame]) -> list[Cause]:
 
 def places(causes: Collection[Cause]) -> int:
     """Return how many causes these are, where one whose formula holds another counts with that one."""
-    return sum(not any(one.holds(other) for other in causes) for one in causes)
+    return sum(one.holds not in {other.id for other in causes} for one in causes)
 
 
 def cause_named(name: str) -> Cause:

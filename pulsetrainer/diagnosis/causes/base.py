@@ -224,15 +224,10 @@ class Cause:
         return None
 
     @property
-    def holds_another(self) -> bool:
-        """Whether its formula is that of another cause, with one parameter more."""
+    def holds(self) -> str:
+        """Id of another cause whose formula is a part of its own; empty where there is none."""
         coarser = self.coarser()
-        return coarser is not None and coarser.id != self.id
-
-    def holds(self, other: Cause) -> bool:
-        """Whether its formula is that of this other cause, with one parameter more."""
-        coarser = self.coarser()
-        return coarser is not None and coarser.id == other.id != self.id
+        return "" if coarser is None or coarser.id == self.id else coarser.id
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""

@@ -100,7 +100,7 @@ def _simpler(state: State, first: tuple[Fitted, Score], other: tuple[Fitted, Sco
     """
     (best, score), (trial, its) = first, other
     known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))
-    fewer = own < known or score.cause.holds(its.cause)
+    fewer = own < known or score.cause.holds == its.cause.id
     usual = score.cause.comes_before if score.cause.comes_before != its.cause.comes_before else fewer
     return usual and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
 

@@ -237,7 +237,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     )
     found = []
     others = [score for score in ranked(without, fitted) if score.cause.id not in fitted.names]
-    others = [score for score in others if not score.cause.holds(term.cause)]  # that would fit anyway
+    others = [score for score in others if score.cause.holds != term.cause.id]  # that would fit anyway
     named = [score.cause for score in others]
     most = max(k for k in range(len(others) + 1) if places(named[:k]) <= LIMITS.closest)
     close = [score for score in others[:most] if score.gain >= LIMITS.rival_screened * gain]
@@ -253,7 +253,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
         terms = (*without.terms, one)
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + near)
         # what may do more, and explains no more, is no reason to doubt what does less
-        within = 0.0 if one.cause.holds_another else max(near, doubt(fitted, trial, state.scores.noise))
+        within = 0.0 if one.cause.holds else max(near, doubt(fitted, trial, state.scores.noise))
         if trial.squares - fitted.squares < within:
             found.append(one.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
