@@ -62,9 +62,9 @@ class EndingError(UsageError):
     """The name of an output promises another format than it gets, or none; the hint has a better one."""
 
     def __init__(self, path: Path, what: str, ending: str, *, usual: str = "out", then: str = "") -> None:
-        without = "is an ending without a name" if path.name.startswith(".") else "has no such ending"
+        without = "has no name before its ending" if path.name.startswith(".") else "has no such ending"
         got = f"ends in {path.suffix.lower()!r}" if path.suffix else without
-        got = "is standard output, which nothing is written to" if path.name == "-" else got
+        got = "is standard output" if path.name == "-" else got
         other = path.parent / f"{path.stem.removesuffix(ending).strip('-. ') or usual}{ending}"
         super().__init__(f"{what}, but {path} {got}", hint=f"name it {shlex.quote(str(other))}{then}")
 

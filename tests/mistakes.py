@@ -134,7 +134,7 @@ def at_once() -> dict[str, Mistake]:
     }
     found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got 'model.h5'")
     found["an argument to a command of none"] = Mistake(
-        ("tune", "now"), 2, "got 'now' as", "leave it out; the file of"
+        ("tune", "now"), 2, "only options, got 'now'", "to name a drive: --drive"
     )
     for name, (line, code, where, then) in _WORDS_OF_A_TIRED_HAND.items():
         found[name] = Mistake(tuple(line.split()), code, where, then)
@@ -189,7 +189,7 @@ _WORDS_IN_QUOTES = {
         "did you mean normal?",
     ),
     "an ending without a name": (
-        *(("plot", "run.h5", "-o", ".png"), ".png is an ending without a name", "name it figure.png"),
+        *(("plot", "run.h5", "-o", ".png"), ".png has no name before its ending", "name it figure.png"),
     ),
     "settings of another format": (
         *(("tune", "-o", "tuned.yaml"), "tuned.yaml ends in '.yaml'", "name it tuned.toml"),
@@ -245,26 +245,26 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "invert normal bifid --model model.h5 -o out.h5",
             2,
-            "takes WAVEFORM only, got 'bifid'",
+            "takes WAVEFORM, got 'bifid' as well",
             "if it is another pulse: one at a time, each with an output",
         ),
     ),
     "a file that a look at the device does not take": ("doctor run.h5", 2, "got 'run.h5'", "leave it out"),
-    "a word for a look at the device": ("doctor now", 2, "got 'now' as well", "leave it out\n"),
+    "a word for a look at the device": ("doctor now", 2, "only options, got 'now'", "leave it out\n"),
     "a port without its option": (
         *("capture identification /dev/ttyUSB0 -o out.h5", 2, "got '/dev/ttyUSB0' as well"),
         "a port is an option: --port /dev/ttyUSB0\n",
     ),
-    "two words too many": ("tune now then", 2, "takes options only, got 'now', 'then' as well", "leave it"),
+    "two words too many": ("tune now then", 2, "takes only options, got 'now', 'then'", "leave it"),
     "pulses with a blank": (
-        *("session --model model.h5 --pulses normal bifid -o out.h5", 2, "got 'bifid' as well"),
+        *("session --model model.h5 --pulses normal bifid -o out.h5", 2, "only options, got 'bifid'"),
         "pulses are an option: --pulses normal,bifid\n",
     ),
     "a table that is absent": (
         "import absent.csv -o out.h5",
         2,
-        "absent.csv does not exist; and --input is missing, and so is --output",
-        "give its path; and name the columns, such as --input 2 --output 3\n",
+        "absent.csv does not exist; and --input (column of the input, by its heading or number) and --output",
+        "no file here has a similar one; and name the columns, such as --input 2 --output 3\n",
     ),
     "json before the command": (
         *("--json show run.h5", 2, "pulsetrainer has no option --json"),
@@ -274,8 +274,13 @@ _WORDS_OF_A_TIRED_HAND = {
         *("-o out.h5 identify run.h5", 2, "pulsetrainer has no option -o"),
         "after the command: pulsetrainer identify run.h5 -o out.h5",
     ),
-    "a long dash": ("identify run.h5 –o out.h5", 2, "–o begins with a long dash", "again: -o"),
-    "a long dash for two": ("identify run.h5 —overwrite", 2, "begins with a long dash", "again: --overwrite"),
+    "a long dash": ("identify run.h5 –o out.h5", 2, "–o begins with a long dash", "again with a hyphen: -o"),
+    "a long dash for two": (
+        "identify run.h5 —overwrite",
+        2,
+        "begins with a long dash",
+        "again with a hyphen: --overwrite",
+    ),
     "a letter of an older option": ("identify run.h5 -f -o out.h5", 2, "no option -f", "or --overwrite?"),
     "seconds for minutes": (
         *("session --model model.h5 -o out.h5 --minutes 30s", 2, "got '30s'", "write it in min, without the"),
@@ -285,7 +290,7 @@ _WORDS_OF_A_TIRED_HAND = {
             "invert normal --model model.h5 -o out.h5 --force-max 90%",
             2,
             "got '90%'",
-            "give it in its own unit, not in %; --force-max: force at the top of the pulse, N or",
+            "give it without %: --force-max is the force at the top of the pulse, N or",
         ),
     ),
     "a choice without its word": (
@@ -417,7 +422,12 @@ _WORDS_OF_A_TIRED_HAND = {
         "'calibrate'",
         "then pulsetrainer identify run.h5 -o",
     ),
-    "a word of others for the bench": ("simulate normal", 2, "'simulate'", "the port bench:, which is the"),
+    "a word of others for the bench": (
+        "simulate normal",
+        2,
+        "'simulate'",
+        "invert normal --model model.h5 -o drive.h5, then pulsetrainer play drive.h5",
+    ),
     "a port where none goes": ("identify run.h5 -o out.h5 --port bench:", 2, "no option --port", "no device"),
     "a height as a share": (
         *("invert normal --model model.h5 -o out.h5 --amplitude 50", 2, "--amplitude", "--force-max"),
@@ -448,7 +458,7 @@ _WORDS_OF_A_TIRED_HAND = {
         '--port "bench:?serial=3"\n',
     ),
     "a backslash in the settings": (
-        *("--settings back.toml show run.h5", 2, "back.toml cannot be read", "into single quotes"),
+        *("--settings back.toml show run.h5", 2, "back.toml cannot be read", "in single quotes"),
     ),
     "help behind one dash": ("identify -help", 2, "no option -help", "pulsetrainer identify --help"),
     "a version that is a command": (
@@ -536,7 +546,7 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "evaluate played.h5 --bounds pulse.toml",
             2,
-            "the bound normal in pulse.toml",
+            "normal in pulse.toml is not the name of",
             "normal.continuous.mean",
         ),
     ),
@@ -544,8 +554,8 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "--show-completion zsh",
             2,
-            "takes no value, got zsh",
-            "print it: _PULSETRAINER_COMPLETE=source_zsh",
+            "takes no value, got 'zsh'",
+            "start zsh, and run there: pulsetrainer --show-completion",
         ),
     ),
     "a setting of a table that is nearly one": (
@@ -603,7 +613,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "an ending without a name for a model": (
         "identify run.h5 -o .h5",
         2,
-        ".h5 is an ending without a name",
+        ".h5 has no name before its ending",
         "name it out.h5",
     ),
     "another ending in another folder": (
@@ -678,7 +688,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force for a capture": (
         *("capture identification -o out.h5 --force-max 5", 2, "no option --force-max"),
-        "for less force a lower --current-max; --limit-force only stops it above a force\n",
+        "give a lower --current-max; --limit-force only stops the capture when the force is higher\n",
     ),
     "a force for a drive": (
         *("play drive.h5 -o out.h5 --force-max 5", 2, "no option --force-max"),
@@ -699,11 +709,11 @@ _WORDS_OF_A_TIRED_HAND = {
     "a text of a model": ("show model.h5 -o x.txt", 2, "no option -o", "pulsetrainer export model.h5 -o"),
     "a rate for a pulse": (
         *("invert normal --model model.h5 -o out.h5 --rate 75", 2, "no option --rate"),
-        "a pulse has its own rate; in a session: pulsetrainer session --rate 75",
+        "session --model model.h5 --rate 75 -o session.h5",
     ),
     "a delimiter": (
         *("import run.csv --input u --output y -o out.h5 --delimiter ;", 2, "no option --delimiter"),
-        "leave it out: the delimiter is recognised",
+        "leave it out: the delimiter is found by itself",
     ),
     "an update without its output": (
         *("check model.h5 --update", 2, "--update, which writes the updated model,", "give both"),
@@ -775,18 +785,18 @@ INSIDE = {
     },
     **{
         f"{words[0]} with a {what} in no units": Mistake(
-            words, 3, f"the {what} plain/{what}.h5 is in no units, expected A and N", f"{_UNITS}, and {then}"
+            words, 3, f"the {what} plain/{what}.h5 has no units, expected A and N", f"{_UNITS}, and {then}"
         )
         for what, then, words in (
-            ("drive", "identify and invert it; or", ("play", "plain/drive.h5", "-o", "out.h5")),
-            ("model", "identify it; or", ("session", "--model", "plain/model.h5", "-o", "out.h5")),
-            ("model", "identify it; or", ("check", "plain/model.h5")),
+            ("drive", "identify and invert it; otherwise", ("play", "plain/drive.h5", "-o", "out.h5")),
+            ("model", "identify it; otherwise", ("session", "--model", "plain/model.h5", "-o", "out.h5")),
+            ("model", "identify it; otherwise", ("check", "plain/model.h5")),
         )
     },
     **{
         f"{words[0]} with one of two in no units": Mistake(
-            *(words, 3, "in no units"),
-            "if both are of one device, and the numbers of that table are in A and N: import the table of "
+            *(words, 3, "has no units"),
+            "if both are of one device, and that table is in A and N: import the table of "
             f"plain/run.h5 again {_UNITS}; otherwise {apart}",
         )
         for apart, words in (
@@ -804,15 +814,15 @@ INSIDE = {
     ),
     "two lines of headings": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "-o", "out.h5"),
-        *(3, "'Time' in the line below the heading 'Channel' of heads.csv was taken for the unit of the"),
-        "if that line holds headings again, delete it; if it holds the units, correct",
+        *(3, "two lines of headings; the second should hold units, but 'Time' below 'Channel'"),
+        "delete one of the two lines, or correct 'Time'",
     ),
     "two lines of headings, and a rate": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "--rate", "10", "-o", "out.h5"),
         *(
             3,
-            "the line below the heading 'CH1' of heads.csv",
-            "keep one line of headings, or give a known unit, such as --input-unit N or mm/s^2",
+            "'Current' in the second line of headings of heads.csv, which should hold units, below 'CH1'",
+            "delete one of the two lines, or give a known unit, such as --input-unit N or mm/s^2",
         ),
     ),
     "cells with their units": Mistake(
@@ -836,12 +846,16 @@ INSIDE = {
         *(
             3,
             "the limit is 0.5 A (limits.current_A in low.toml)",
-            "correct it there, or give --limit-current; or",
+            "raise it there to 1.5, or give --limit-current 1.5; or",
         ),
     ),
     "a limit of the force in the settings": Mistake(
         ("--settings", "newton.toml", "play", "drive.h5", "-o", "out.h5"),
-        *(4, "the limit is 4 N (limits.force_N in newton.toml)", "give --limit-force; or capture again"),
+        *(
+            4,
+            "the limit is 4 N (limits.force_N in newton.toml)",
+            "raise it there to 14 or more, or give --limit-force 14; or capture again",
+        ),
     ),
     "a force above its limit": Mistake(
         (*EXCITATION, "-o", "out.h5", "--limit-force", "5"),
@@ -852,7 +866,10 @@ INSIDE = {
         *(4, "(it comes from port in gone.toml)", "correct it there, or give --port"),
     ),
     "a port of Windows": Mistake(
-        ("play", "drive.h5", "-o", "out.h5", "--port", "COM3"), 4, "no port COM3", "COM ports are of Windows"
+        ("play", "drive.h5", "-o", "out.h5", "--port", "COM3"),
+        4,
+        "no port COM3",
+        "COM ports exist on Windows only",
     ),
     "a port without its folder": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "ttyUSB99"),
@@ -864,15 +881,19 @@ INSIDE = {
     ),
     "heat of a coil that is not known": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--track-heat"),
-        *(3, "does not know the resistance of its coil", "leave --track-heat out, or make the model anew"),
+        *(
+            3,
+            "holds no resistance of its coil",
+            "then pulsetrainer invert normal --model long-model.h5 -o long-drive.h5",
+        ),
     ),
     "a model to be resumed": Mistake(
         ("capture", "identification", "-o", "model.h5", "--resume"),
-        *(2, "model.h5 is a model, no interrupted recording", "name the recording that broke off"),
+        *(2, "model.h5 is a model, not an interrupted recording", "name the recording that broke off"),
     ),
     "repeats for a fortnight": Mistake(
         ("capture", "identification", "-o", "out.h5", "--repeats", "100000"),
-        *(3, "--repeats 100000 times 98001 samples", "far fewer --repeats; at most 10203"),
+        *(3, "--repeats 100000 times 98001 samples", "at most --repeats 10203"),
     ),
     "a pulse in milliseconds": Mistake(
         ("invert", "slow.csv", "--model", "model.h5", "-o", "out.h5"),
@@ -977,13 +998,16 @@ INSIDE = {
         *(2, "creep=5% is not a number from 0 to 0.5", "write 0.05 for 5 %\n"),
     ),
     "a table whose columns are not named": Mistake(
-        ("import", "wide.csv", "-o", "out.h5"), 2, "--input is missing", "--input Spannung --output Kraft"
+        ("import", "wide.csv", "-o", "out.h5"),
+        2,
+        "are missing; wide.csv has",
+        "--input Spannung --output Kraft",
     ),
     "a table that is empty": Mistake(
         *(
             ("import", "empty.csv", "-o", "out.h5"),
             2,
-            "empty.csv is empty; and --input is missing, and so is",
+            "empty.csv is empty; and --input (column of the input",
         ),
         "export the recording again; and name the columns, such as --input 2 --output 3\n",
     ),
@@ -1013,7 +1037,7 @@ INSIDE = {
         ("session", "--model", "model.h5", "drive.h5", "-o", "out.h5"),
         *(
             2,
-            "got 'drive.h5' as well",
+            "only options, got 'drive.h5'",
             "a session makes its own drives; to play one: pulsetrainer play drive.h5",
         ),
     ),
@@ -1025,12 +1049,15 @@ INSIDE = {
         ("check", "model.h5", "plain/model.h5"), 2, "got 'plain/model.h5'", "one model at a time"
     ),
     "a model for a drive": Mistake(
-        ("play", "drive.h5", "model.h5", "-o", "out.h5"), 2, "got 'model.h5'", "a drive already holds what"
+        ("play", "drive.h5", "model.h5", "-o", "out.h5"),
+        2,
+        "got 'model.h5'",
+        "a drive already holds all that",
     ),
     "a drive to tune by": Mistake(
         ("tune", "drive.h5"), 2, "got 'drive.h5'", "a drive is an option: --drive drive.h5\n"
     ),
-    "a run to tune by": Mistake(("tune", "run.h5"), 2, "got 'run.h5'", "leave it out; the file of a drive"),
+    "a run to tune by": Mistake(("tune", "run.h5"), 2, "got 'run.h5'", "to name a drive: --drive drive.h5"),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"),
@@ -1051,7 +1078,7 @@ INSIDE = {
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--force-max", "-2"),
         3,
         "-2 N is asked for, but model.h5 reaches",
-        "--force-min",
+        "stay inside, such as --force-max 13.6\n",
     ),
     "bounds that are no text": Mistake(
         ("evaluate", "played.h5", "--bounds", "run.h5"), 2, "not a text file", "write it as TOML"
@@ -1093,7 +1120,7 @@ INSIDE = {
         ("capture", "identification", "-o", "out.h5", "--port", "bench"),
         4,
         "no port bench",
-        "write its colon: --port bench:\n",
+        "add the colon: --port bench:\n",
     ),
     "a table of a pulse that is not there": Mistake(
         ("invert", "absent.csv", "--model", "model.h5", "-o", "out.h5"),
@@ -1101,15 +1128,15 @@ INSIDE = {
     ),
     "a bench in capitals": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "BENCH:"),
-        *(4, "no port BENCH:", "write it in small letters: --port bench:\n"),
+        *(4, "no port BENCH:", "write it in lower case: --port bench:\n"),
     ),
     "a bench without its colon that is only planned": Mistake(
         ("play", "drive.h5", "-o", "out.h5", "--port", "bench", "--dry-run"),
-        *(4, "no port bench", "write its colon: --port bench:\n"),
+        *(4, "no port bench", "add the colon: --port bench:\n"),
     ),
     "more levels than there can be": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "100000000"),
-        *(3, "--levels must be a whole number from 2 to 10000, got 100000000", "48 levels"),
+        *(2, "--levels must be a whole number from 2 to 10000, got 100000000", "the usual 48"),
     ),
     "a speed that no signal has": Mistake(
         ("capture", "identification", "-o", "out.h5", "--speed", "1e9"),
@@ -1121,11 +1148,15 @@ INSIDE = {
     ),
     "a speed that takes for ever": Mistake(
         ("capture", "identification", "-o", "out.h5", "--speed", "1e-9"),
-        *(3, "it goes 73.5 A at 1e-09 A/s (--speed)", "give a higher --speed (0.75 is usual)"),
+        *(
+            3,
+            "at 1e-09 A/s (--speed) the signal would last 7.35e+10 s",
+            "give a higher --speed (0.75 is usual)",
+        ),
     ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
-        *(4, "no port bench?seed=3", "write its colon: --port 'bench:?seed=3&creep=0'"),
+        *(4, "no port bench?seed=3", "add the colon: --port 'bench:?seed=3&creep=0'"),
     ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
@@ -1156,7 +1187,11 @@ INSIDE = {
     ),
     "a heading that two columns have": Mistake(
         ("import", "twice.csv", "--input", "x", "--output", "x", "-o", "out.h5"),
-        *(3, "2 columns have that heading, and are called x#1, x#2", "name one of them: 'x#1' or 'x#2'"),
+        *(
+            3,
+            "has 2 columns with the heading 'x'; they are called x#1, x#2",
+            "name one of them: 'x#1' or 'x#2'",
+        ),
     ),
     "a column without a name": Mistake(
         ("import", "wide.csv", "--input", "", "--output", "Kraft", "-o", "out.h5"),
@@ -1254,7 +1289,11 @@ _UNREADABLE = {
         *("letter.csv has no rows of numbers", "one column per quantity"),
     ),
     "data.json": (
-        *(_IMPORT, '{\n "t_s": [0, 1],\n "current_A": [0, 1]\n}\n', "data.json is JSON, which is not read"),
+        *(
+            _IMPORT,
+            '{\n "t_s": [0, 1],\n "current_A": [0, 1]\n}\n',
+            "data.json is JSON, which import cannot read",
+        ),
         "export it as CSV, TSV, .npz, .npy, .mat or .wav",
     ),
     "bad.npy": (_IMPORT, "zK\3\4 nothing", "not a .npy array of numbers that can be read\n", "save it again"),
@@ -1275,7 +1314,7 @@ _UNREADABLE = {
         *(_CAPTURE, "t_s,current_A\n0,0\n1,1,2\n2,0\n"),
         *(
             "has 3 columns in line 3",
-            "if 1,2 is a decimal comma, write 1.2, or part the columns by semicolons\n",
+            "if 1,2 is a decimal comma, write 1.2, or separate the columns by semicolons\n",
         ),
     ),
 }

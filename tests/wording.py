@@ -66,7 +66,7 @@ MESSAGES = {
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "name one of these", "{file}", "force_N", "t_s, current_A"),
-    "column not named": Message("--input is missing", "--input 'Drive (V)'", "piezo.csv", "{has}"),
+    "column not named": Message("are missing", "--input 'Drive (V)'", "piezo.csv", "{has}"),
     "not finite": Message(" a number: ", "remove", "{file}", got="{value} in column {column}, line {line}"),
     "separator of thousands": Message(
         "not a number", "thousands separators", got="{cell!r} in column {column}, line {line}"
@@ -83,6 +83,7 @@ MESSAGES = {
         "does not increase", "more digits", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"
     ),
     "no numbers": Message("no numbers", "another column", "{file}", "column t_s"),
+    "several columns": Message("columns with the heading {asked!r}", "{near!r}", expected="{has}"),
     "nearest column": Message("no column '{asked}'", "{near}", expected="{has}"),
     "two lengths": Message("one length", ""),
     "out of all bounds": Message("goes from", "", "{place}", "the limit of 1e+100", "first is in {first}"),
@@ -99,11 +100,11 @@ MESSAGES = {
     "no such rate": Message(
         "the rate", "10000 Hz or a whole fraction of it", expected="10000 Hz", got="{got} Hz"
     ),
-    "too slow": Message("the signal would have", "(0.75 is usual)", got="{got} samples"),
+    "too slow": Message("the signal would last", "(0.75 is usual)", got="{got} samples"),
     "too fast": Message("between two samples", "(0.75 is usual)", expected="1.5", got="1e+297"),
     "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
     "too many samples": Message(
-        "samples", "at most", expected="more than {most}", got="{times} times {samples}"
+        "samples", "at most", expected="at most {most}", got="{times} times {samples}"
     ),
     "not a smoothing": Message(
         "--smoothing", "--smoothing auto", expected="a number from 0 to 1", got="'{got}'"
@@ -135,7 +136,7 @@ MESSAGES = {
     "nothing to take out": Message("neither a diagnosis nor a delay", "`diagnosis`"),
     "delay too long": Message("is only", "seconds", expected="{length}", got="a delay of {given}"),
     "no units": Message(
-        "in no units", "table of {file} again with --input-unit A --output-unit N, and", "{file}", "A and N"
+        "has no units", "table of {file} again with --input-unit A --output-unit N, and", "{file}", "A and N"
     ),
     "another kind of device": Message("takes", "captured on the device", "the model {file}", "(A and N)"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),

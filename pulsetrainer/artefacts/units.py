@@ -183,8 +183,8 @@ def units_alike(name: str, one: Run | Model, other_name: str, other: Run | Model
     known, lacks, noun = (other, name, one) if bare[0] else (one, other_name, other)
     anew = f"import the table of {lacks} again with {as_parameters(known.input_unit, known.output_unit)}"
     anew += ", and identify it again" * (noun.kind == "model")
-    same = f"if both are of one device, and the numbers of that table are in {units_of(known)}"
-    return f"{same}: {anew}; otherwise {apart}"
+    units = " and ".join(map(shown, (known.input_unit, known.output_unit)))
+    return f"if both are of one device, and that table is in {units}: {anew}; otherwise {apart}"
 
 
 def _with_micro(unit: str) -> str:
@@ -365,10 +365,10 @@ def unit_of_axis(seconds: float) -> tuple[str, float]:
     return next((unit, one) for unit, one, least in _EASY if seconds >= least or unit == "s")
 
 
-def units_of(measured: Run | Model | Waveform) -> str:
-    """Return the units of an input and an output in words: ``A and N``; ``no units`` where there are none."""
+def in_units(measured: Run | Model | Waveform) -> str:
+    """Return what units an input and an output have, with a verb: ``is in A and N``, ``has no units``."""
     units = [shown(unit) for unit in (measured.input_unit, measured.output_unit)]
-    return " and ".join(unit or "no unit" for unit in units) if any(units) else "no units"
+    return f"is in {' and '.join(unit or 'no unit' for unit in units)}" if any(units) else "has no units"
 
 
 def counted(number: int, noun: str, one: str = "", more: str = "") -> str:

@@ -24,7 +24,9 @@ def capture(
     port: options.Port = None,
     levels: Annotated[
         int,
-        options.setting("levels", "--levels", "Levels of the plane whose cells the signal switches.", min=2),
+        options.setting(
+            "levels", "--levels", "Levels of the plane whose cells the signal switches.", min=2, max=10_000
+        ),
     ] = 48,
     current_max_A: Annotated[
         float, options.setting("current_max_A", "--current-max", "Top of the range, A.")

@@ -7,11 +7,11 @@ BEHIND = {
     "": "to look into a file: pulsetrainer show {extra}",
     "session waveform": "a session makes its own drives; to play one: pulsetrainer play {extra} -o played.h5",
     "check run": "to test a model on a run: pulsetrainer evaluate {extra} --model model.h5",
-    "tune": "the file of a drive is an option: --drive drive.h5",
+    "tune": "to name a drive: --drive drive.h5",
     "ports": "to look at one port: pulsetrainer doctor --port {port}",
     "invert": "if it is another pulse: one at a time, each with an output of its own",
     "capture": "if it is another signal: one at a time, each with an output of its own",
-    "play model": "a drive already holds what is needed of its model",
+    "play model": "a drive already holds all that is needed of its model",
     "FILE.h5": "one file at a time, its name in quotes if it has spaces; to compare evaluations or "
     "sessions: pulsetrainer compare a.h5 b.h5",
 }
@@ -27,7 +27,8 @@ NO_COMMAND = {
     "fit": "pulsetrainer identify run.h5 -o model.h5",
     "calibrate": "to model the device: pulsetrainer capture identification -o run.h5, then "
     "pulsetrainer identify run.h5 -o model.h5; to set the gains of the current control: pulsetrainer tune",
-    "simulate": "the simulated device is the port bench:, which is the default: pulsetrainer capture --help",
+    "simulate": "without --port every command plays on the simulated device: pulsetrainer invert normal "
+    "--model model.h5 -o drive.h5, then pulsetrainer play drive.h5 -o played.h5",
     "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
 }
 NO_OPTION = {
@@ -35,18 +36,19 @@ NO_OPTION = {
     "play --model": "leave it out: a drive holds the model that it was made with",
     "refine --model": "leave it out: a drive holds the model that it was made with",
     "identify --model": "to test a model on a run: pulsetrainer evaluate {behind}",
-    "invert --amplitude": "the height of a drive is a force: --force-max, and --force-min",
-    "ports --port": "to look at one: pulsetrainer doctor --port PORT",
-    "capture --force-max": "a capture sets the current, not the force: for less force a lower --current-max; "
-    "--limit-force only stops it above a force",
+    "invert --amplitude": "the height of a drive is given as a force: --force-max, and --force-min",
+    "ports --port": "to look at one port: pulsetrainer doctor --port {value}",
+    "capture --force-max": "a capture sets the current, not the force: give a lower --current-max; "
+    "--limit-force only stops the capture when the force is higher",
     "session --force-max": "the height is --amplitude, in % of what the model reaches",
     "play --html": "evaluate writes it: pulsetrainer evaluate {out} --html {value}",
     "identify --html": "diagnose writes it: pulsetrainer diagnose run.h5 --model {out} -o diagnosis.h5 "
     "--html {value}; for a figure: pulsetrainer plot {out}",
     "show -o": "to write a table: pulsetrainer export model.h5 -o model.csv",
     "show --out": "to write a table: pulsetrainer export model.h5 -o model.csv",
-    "invert --rate": "a pulse has its own rate; in a session: pulsetrainer session --rate {value}",
-    "import --delimiter": "leave it out: the delimiter is recognised",
+    "invert --rate": "a pulse has its own rate; a session sets it: "
+    "pulsetrainer session --model model.h5 --rate {value} -o session.h5",
+    "import --delimiter": "leave it out: the delimiter is found by itself",
     "--force-max": "the height is that of the drive: pulsetrainer invert normal --model model.h5 -o drive.h5 "
     "--force-max {value}",
     "--version": "pulsetrainer --version",

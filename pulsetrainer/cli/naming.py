@@ -21,7 +21,10 @@ from pulsetrainer.files.input_file import apart, cut_off, in_quotes, is_sound, n
 from pulsetrainer.files.pulses import library
 
 # of commands that take a run: what to do instead of making one in the usual way
-_DIAGNOSTIC = "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table"
+_DIAGNOSTIC = (
+    "to record one: pulsetrainer capture diagnostic -o {path}, or to make one of a table: "
+    "pulsetrainer import TABLE.csv --input COLUMN --output COLUMN -o {path}"
+)
 _RUN_FOR = {
     "diagnose": _DIAGNOSTIC,
     "evaluate": _DIAGNOSTIC,
@@ -108,7 +111,7 @@ class Command(TyperCommand):
 
 def _with_file(said: str, given: Any) -> str:
     """Return a message with the file of the model, the drive or the bounds that it begins with."""
-    found = re.match(r"the (model|drive|bounds) (?=takes |is of |is in |name |does not know )", said)
+    found = re.match(r"the (model|drive|bounds) (?=takes |is of |is in |name |holds |has )", said)
     file = given.get(found[1]) if found else None
     file = file[0] if isinstance(file, list | tuple) and len(file) == 1 else file
     return f"{found[0]}{file} {said[found.end() :]}" if found and isinstance(file, str | Path) else said
@@ -123,8 +126,10 @@ def _tell_who_set_it(error: PulsetrainerError, context: Any) -> None:
             error.message = said.replace(f"({one.opts[0]})", f"({elsewhere[0]})")
             if error.message == said:
                 error.message += f" (it comes from {elsewhere[0]})"
-            _, also, other = error.hint.partition("; or ")  # what else can be done still holds
-            error.hint = elsewhere[1] + also + other
+            first, also, other = error.hint.partition("; or ")  # what else can be done still holds
+            if higher := re.match(r"raise `\w+` to (([\d.]+)(?: or more)?)", first):
+                first = f"raise it there to {higher[1]}, or give {one.opts[0]} {higher[2]}"
+            error.hint = (first if higher else elsewhere[1]) + also + other
 
 
 def _check_names(parameter: Any, typed: Any) -> None:
@@ -200,9 +205,10 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     elif kinds:
         usual = f"to make one: {to_make(kinds[0], error.path)}"
         instead = _RUN_FOR.get(command, usual) if kinds == ("run",) else usual
+        instead = instead.replace("{path}", shlex.quote(str(error.path)))
         error.hint = f"there is no {in_words(kinds)} file {where}; {instead}"
     else:
-        error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"
+        error.hint = f"there are no files that pulsetrainer wrote {where}: give the full path of one"
 
 
 def _for_a_pulse(path: Path, name: str, context: typer.Context) -> str:
@@ -211,5 +217,9 @@ def _for_a_pulse(path: Path, name: str, context: typer.Context) -> str:
         return f"{path.stem} is a pulse of the library: write it without {path.suffix}"
     if str(path) not in library() or (name != "drive" and (name, context.info_name) != ("model", "invert")):
         return ""
-    model = context.params.get("waveform") or "model.h5"  # of invert: the two were exchanged
-    return f"{path} is a pulse: pulsetrainer invert {path} --model {shlex.quote(model)} -o drive.h5"
+    other = str(context.params.get("waveform") or "model.h5")  # of invert: the two were exchanged
+    there = {str(path): other, other: str(path)}
+    if name == "model" and other.endswith(".h5"):
+        words = (there.get(word, word) for word in context.meta[__name__])
+        return f"{path} is a pulse; exchange the two: pulsetrainer invert {shlex.join(words)}"
+    return f"{path} is a pulse; make a drive of it: pulsetrainer invert {path} --model model.h5 -o drive.h5"

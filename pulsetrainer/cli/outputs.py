@@ -35,11 +35,12 @@ def check_ending(path: Path, context: typer.Context) -> None:
     """Refuse an output whose name promises another format than it gets."""
     command, ending = context.info_name, path.suffix.lower()
     if str(path) == str(context.params.get("html")):
-        _check_text(path, "a page is written as HTML", ".html", "; a browser prints it to PDF")
+        print_it = "; a browser prints it to PDF" * (ending == ".pdf")
+        _check_text(path, "a page is written as HTML", ".html", print_it)
     elif command == "tune":
-        _check_text(path, "a file of settings is written as TOML", ".toml", "")
+        _check_text(path, "settings are written as TOML", ".toml", "")
     elif command not in _WRITE_NO_ARTEFACT:
-        then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
+        then = "; pulsetrainer export makes a table of it, and pulsetrainer plot a figure"
         if ending == ".html" and "html" in context.params:
             then = f", and the page with --html {path}"
         check_artefact_name(path, f"{command} writes HDF5", then=then)

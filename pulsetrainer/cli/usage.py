@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pulsetrainer.cli.instead import BEHIND, NO_COMMAND, NO_OPTION, OFF, SHELLS, SWITCHED
-from pulsetrainer.cli.next_step import HOLDS
+from pulsetrainer.cli.extra_word import command_for, for_a_switch, one_too_many, value_of
+from pulsetrainer.cli.instead import NO_OPTION, SHELLS
 from pulsetrainer.cli.values import bad_value, meaning_of, must_be, named
-from pulsetrainer.errors import UsageError, in_words
-from pulsetrainer.files.input_file import in_quotes, likely_kind, name_columns
-from pulsetrainer.files.pulses import library
+from pulsetrainer.errors import UsageError
+from pulsetrainer.files.input_file import likely_kind, name_columns
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -24,7 +23,6 @@ _EXAMPLES = {
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
 }
 _COLUMNS = ("input_column", "output_column")
-_PORT = re.compile(r"/dev/|COM\d|(bench|qemu|socket):|tty")
 _LONG_DASHES = ("\N{EN DASH}", "\N{EM DASH}", "\N{MINUS SIGN}")
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..*? '(.*?)')?")  # the nearest comes first
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
@@ -46,8 +44,8 @@ def usage_of(error: Exception, words: Sequence[str]) -> UsageError | None:
         name = command.rpartition(" ")[2]
         behind = shlex.join(words[words.index(name) + 1 :]) if name in words else ""
         known = NO_OPTION.get(f"{name} {given}") or NO_OPTION.get(given, "")
-        out = _value_of("-o", words) or "out.h5"
-        known = moved or known.format(behind=behind, value=_value_of(given, words), out=out).rstrip()
+        out = value_of("-o", words) or "out.h5"
+        known = moved or known.format(behind=behind, value=value_of(given, words), out=out).rstrip()
         if Path(given).is_file():
             known = f"if that is the name of a file, write ./{given}"
         return UsageError(f"{command} has no option {given}", hint=known or hint)
@@ -85,14 +83,14 @@ def check_apart(words: Sequence[str]) -> None:
             short = word.lstrip("".join(_LONG_DASHES))
             dash = "-" if len(short) == 1 or short[:1].isdigit() else "--"
             raise UsageError(
-                f"{word} begins with a long dash, as a word processor makes it, and is no option",
-                hint=f"type the dash again: {dash}{short}",
+                f"{word} begins with a long dash, as a word processor makes it, not with a hyphen",
+                hint=f"type it again with a hyphen: {dash}{short}",
             )
     first, second = (*words, "", "")[:2]  # typer asks the surroundings for the shell, not the words
     if first in ("--show-completion", "--install-completion") and second:
         raise UsageError(
-            f"{first} is for the shell it runs in and takes no value, got {second}",
-            hint=f"run it in {second}, or print it: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
+            f"{first} takes no value, got {second!r}: it is for the shell that it runs in",
+            hint=f"start {second}, and run there: pulsetrainer {first}"
             if second in SHELLS
             else f"write {first} alone",
         )
@@ -110,13 +108,6 @@ def _elsewhere(option: str, context: Any, words: Sequence[str]) -> str:
         end, side = next((k for k, word in enumerate(words) if k > at and word in own), at), "after"
         line = [*words[:at], *words[end:], *words[at:end]]
     return f"put it {side} the command: {shlex.join(['pulsetrainer', *line])}" if line != [*words] else ""
-
-
-def _value_of(option: str, words: Sequence[str]) -> str:
-    """Return what was typed behind an option, or in it after ``=``, as a shell takes it."""
-    at = next((k for k, word in enumerate(words) if word.partition("=")[0] == option), len(words))
-    value = "".join(words[at : at + 1]).partition("=")[2] or "".join(words[at + 1 : at + 2])
-    return value and shlex.quote(value)
 
 
 def _as_typed(option: str, words: Sequence[str]) -> str:
@@ -144,9 +135,9 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     example = _EXAMPLE.search(context.command.help or "")
     like = example[1] if example else help_
     lacks = [p for p in context.command.params if p.required and context.params.get(p.name) is None]
-    others = " and ".join(named(one) for one in lacks if one is not parameter)
-    also = f", and so {'are' if ' and ' in others else 'is'} {others}" if others else ""
-    said = f"{named(parameter)} is missing{also}: {meaning_of(parameter)}"
+    each = [f"{named(one)} ({meaning_of(one)})" for one in lacks]
+    several = f"{', '.join(each[:-1])} and {each[-1]} are missing" if len(each) > 1 else ""
+    said = several or f"{named(parameter)} is missing: {meaning_of(parameter)}"
     given: list[Path] = context.params.get("files") or []
     if given and parameter.name in _COLUMNS:
         options = {_COLUMNS.index(one.name): named(one) for one in lacks if one.name in _COLUMNS}
@@ -162,7 +153,7 @@ def _with_or_without_value(error: Exception, context: Any, help_: str, words: Se
     option = getattr(error, "option_name", "an option")
     params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
-        return _for_a_switch(option, _value_of(option, words), params)
+        return for_a_switch(option, value_of(option, words), params)
     one = next((one for one in params if option in one.opts), None)
     choices = ", ".join(getattr(getattr(one, "type", None), "choices", ()))
     meaning = f": one of {choices}" if choices else f": {meaning_of(one).partition(';')[0]}" if one else ""
@@ -172,66 +163,8 @@ def _with_or_without_value(error: Exception, context: Any, help_: str, words: Se
 def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
     """What has no words of its own here, but for one argument too many and a command that does not exist."""
     if extra := _EXTRA.match(said):
-        return _one_too_many(extra[1], command, parsed, words)
+        return one_too_many(extra[1], command, parsed, words)
     if unknown := _UNKNOWN.match(said):
-        hint = _command_for(unknown[1], unknown[2], parsed, words)
+        hint = command_for(unknown[1], unknown[2], parsed, words)
         return UsageError(f"there is no command {unknown[1]!r}", hint=hint)
     return UsageError(said, hint=f"{command} --help")
-
-
-def _command_for(word: str, near: str, parsed: Any, words: Sequence[str]) -> str:
-    """What to type in the place of a word that is no command: a file, a line in quotes, capitals."""
-    if word == "help" and (of := [word for word in words if word in parsed.commands]):
-        return f"pulsetrainer {of[0]} --help"
-    if word in NO_COMMAND:
-        return NO_COMMAND[word]
-    first = word.strip().partition(" ")[0]
-    if first != word and first in parsed.commands:
-        return f"leave out the quotes: pulsetrainer {word}"
-    if Path(word).is_file():
-        return f"to look into a file: pulsetrainer show {shlex.quote(word)}"
-    if first.lower() in parsed.commands:
-        near = first.lower()
-    return f"did you mean {near}? All commands: pulsetrainer --help" if near else "pulsetrainer --help"
-
-
-def _one_too_many(extra: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
-    """What stands behind the arguments that a command takes."""
-    every = [extra] if extra in words else extra.split()
-    word, params, name = every[0], parsed.params, command.rpartition(" ")[2]
-    before = words[words.index(word) - 1] if word in words else ""
-    if word.lower() in SWITCHED and any(before in (*p.opts, *p.secondary_opts) for p in params):
-        return _for_a_switch(before, word, params)
-    taken = " and ".join(named(p) for p in params if not p.opts[0].startswith("-")) or "options"
-    return UsageError(
-        f"{command} takes {taken} only, got {', '.join(map(repr, every))} as well",
-        hint=in_quotes(words, name) or _meant_by(word, (name, taken), params, words),
-    )
-
-
-def _meant_by(word: str, of: tuple[str, str], params: Sequence[Any], words: Sequence[str]) -> str:
-    """What to do with a word too many: what it is tells what it was meant for."""
-    kind, quoted, typed = likely_kind(Path(word)), shlex.quote(word), {one.partition("=")[0] for one in words}
-    taken = {one.opts[0]: HOLDS.get(one.name, ()) for one in params if not typed & {*one.opts}}
-    unknown, port = not kind and word.endswith(".h5"), quoted if _PORT.match(word) else "PORT"
-    option = next((o for o in taken if o[0] == "-" and (kind in taken[o] or (unknown and taken[o]))), "")
-    to_write = word.endswith(".toml") if of[0] == "tune" else "--update" in typed and not Path(word).exists()
-    pulses = ",".join(filter(None, (_value_of("--pulses", words), word)))
-    also = next(filter(None, map(BEHIND.get, (f"{of[0]} {kind}", *of, "" if kind else "-"))), "")
-    ways = {
-        f"a {in_words(taken.get(option, ()))} is an option: {option} {quoted}": option,
-        f"a port is an option: --port {port}": "--port" in taken and port == quoted,
-        f"pulses are an option: --pulses {pulses}": of[0] == "session" and {*word.split(",")} <= {*library()},
-        f"the file to write is an option: -o {quoted}": "-o" in taken and to_write,
-        f"one {in_words([kind])} at a time: run it once for each": any(kind in one for one in taken.values()),
-        f"leave it out{also and '; '}{also.format(extra=quoted, port=port)}": True,
-    }
-    return next(way for way, fits in ways.items() if fits)
-
-
-def _for_a_switch(option: str, value: str, params: Sequence[Any]) -> UsageError:
-    """A word such as yes or no behind an option that is on where it is given."""
-    off = [one.secondary_opts[-1:] for one in params if option in one.opts and value.lower() in OFF]
-    ways = [f"to switch it off: {other[0]}" if other else f"leave {option} out" for other in off]
-    said = f"{option} is a switch and takes no value, got {value!r}"
-    return UsageError(said, hint=(*ways, f"write {option} alone")[0])

@@ -98,7 +98,7 @@ def _as_a_number(parameter: Any, must: str) -> str:
         factor = _SECONDS[unit] / _SECONDS[said[1]]
         return f"write it in {said[1]}, without the unit: {float(number) * factor:g}"
     # what is typed in % must not be taken for N
-    return f"give it in its own unit, not in {unit}; {named(parameter)}: {meaning_of(parameter)}"
+    return f"give it without {unit}: {named(parameter)} is the {meaning_of(parameter)}"
 
 
 def _choice(parameter: Any, must: str, context: Any) -> str:

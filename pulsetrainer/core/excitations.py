@@ -42,8 +42,8 @@ def check_size(times: int, samples: float, most: int = MOST_SAMPLES, what: str =
     """Raise ArgumentError where these ``samples`` so many ``times``, by ``what``, are more than ``most``."""
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
-            f"`{what}` {str(times)[:20]} times {samples:.6g} samples are more than {most:,}",
-            hint=f"give far fewer `{what}`; at most {int(most // samples)} can be recorded"
+            f"`{what}` {str(times)[:20]} times {samples:.6g} samples are too many, expected at most {most:,}",
+            hint=f"give at most `{what}` {int(most // samples)}"
             if 0 < samples <= most
             else "give fewer, or shorter ones",
         )
@@ -66,10 +66,10 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
         steps = float(distance[-1] / speed * rate_Hz)
     if not steps <= MOST_SAMPLES or not np.isfinite(speed / rate_Hz):
         raise ArgumentError(
-            f"the signal would have {steps:.3g} samples, expected at most {MOST_SAMPLES:.3g}: it goes "
-            f"{distance[-1]:.3g} A at {speed:g} A/s (`speed_A_per_s`), {rate_Hz:g} samples a second",
-            hint=f"give a higher `speed_A_per_s` ({_USUAL_SPEED:g} is usual), a lower `rate_Hz` or a "
-            "smaller range",
+            f"at {speed:g} A/s (`speed_A_per_s`) the signal would last {distance[-1] / speed:.3g} s and have "
+            f"{steps:.3g} samples, expected at most {MOST_SAMPLES:.3g}",
+            hint=f"give a higher `speed_A_per_s` ({_USUAL_SPEED:g} is usual), a lower `rate_Hz`, or a lower "
+            "`current_max_A`",
         )
     # a turn between two samples would be cut short: put it on the nearest sample, each turn on one of its own
     apart = np.abs(np.diff(points)) > _DUST * np.abs(points).max()

@@ -210,8 +210,8 @@ class Rehearsal:
 def less_current(than: str) -> str:
     """Say how less is pressed in all that is made from a model: a lower pulse does not do it."""
     return (
-        f"capture again with {than}, and make a new model and drive from that run (identify, invert): "
-        "every drive and session begins with a stroke over the whole range of its model"
+        f"capture again with {than}, then identify and invert that run: a lower pulse alone does not help, "
+        "as every drive begins with a stroke over the whole range of its model"
     )
 
 

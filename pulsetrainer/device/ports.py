@@ -113,7 +113,7 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         present = ", ".join(p.device for p in list_ports()) or "none"
         hint, nor = "check the cable, then `pulsetrainer ports`", ""
         if os.name == "posix" and re.fullmatch("COM[0-9]+", port):
-            hint = "COM ports are of Windows; `pulsetrainer ports` lists those of this computer"
+            hint = "COM ports exist on Windows only; pulsetrainer ports lists the ports of this computer"
         elif re.match(r"(tty|cu\.)\w", port) and Path("/dev", port).exists():
             hint = f"write its path: `port` /dev/{port}"
         elif os.name == "posix" and re.match(r"(tty|cu\.)\w", port):

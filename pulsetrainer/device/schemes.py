@@ -72,8 +72,8 @@ def find_opener(port: str) -> Opener | None:
         name, mark, rest = port.partition("?")
         meant = f"{name.lower().rstrip(':')}:{mark}{rest}"
         if name.lower().rstrip(":") in _OPENERS:
-            how = "its colon" if name.islower() else "it in small letters"
-            raise DeviceError(f"there is no port {port}", hint=f"write {how}: `port` {shlex.quote(meant)}")
+            how = "add the colon" if name.islower() else "write it in lower case"
+            raise DeviceError(f"there is no port {port}", hint=f"{how}: `port` {shlex.quote(meant)}")
         return None
     scheme, slashes = match.groups()
     if scheme not in _OPENERS and not slashes:

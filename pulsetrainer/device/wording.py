@@ -6,7 +6,7 @@ from enum import IntEnum
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.limits import FORCE_N, less_current
+from pulsetrainer.device.limits import FORCE_N
 
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # Faults of which the force sensor is the likely cause.
@@ -18,7 +18,7 @@ _OTHERWISE = "otherwise "
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
     codes.Fault.OVER_FORCE: f"if nothing pressed that hard, check the force sensor; {_OTHERWISE}"
-    + less_current("`current_max_A` well below the current given here"),
+    "capture with `current_max_A` well below the current given here, and make drives from that run",
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.CURRENT_FROZEN: "check the current sensor, its wires and its supply",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.artefacts.units import counted, same_units, units_alike, units_of, with_unit
+from pulsetrainer.artefacts.units import counted, in_units, same_units, units_alike, with_unit
 from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray, ends_of
@@ -78,7 +78,7 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     """Raise DataError unless run and model can be of one device."""
     if not same_units((run.input_unit, run.output_unit), (model.input_unit, model.output_unit)):
         raise DataError(
-            f"{name} is in {units_of(run)}, but {model_name} was identified in {units_of(model)}",
+            f"{name} {in_units(run)}, but {model_name} {in_units(model)}",
             hint=units_alike(name, run, model_name, model, "give a model of the device of that run")
             or "use a model of the same device; in other units, convert the columns and import again",
         )

@@ -42,9 +42,10 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                 if type(pair) in (int, float):
                     least = f"[{pair}, {100 if pair <= 100 else 'inf'}] if at least {pair} is meant"
                     hint = f"write {key} = {least}, [0, {pair}] if at most"
+                if "." not in name:
+                    raise UsageError(f"{name} in {path} is not the name of a figure with bounds", hint=_HOW)
                 raise UsageError(
-                    f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=hint if "." in name else _HOW,
+                    f"the bound {name} in {path} must be a pair [low, high], got {pair!r}", hint=hint
                 )
     if not bounds:
         raise UsageError(f"{path} has no bounds in it, so nothing would be checked", hint=_HOW)

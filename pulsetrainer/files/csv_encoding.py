@@ -27,7 +27,7 @@ def encoding_of(path: Path) -> str:
         raise DataError(f"{path} is {found}, not a table", hint="export the recording as CSV, and give that")
     if path.suffix.lower() == ".json" or _JSON.match(start):
         hint = "export it as CSV, TSV, .npz, .npy, .mat or .wav"
-        raise DataError(f"{path} is JSON, which is not read", hint=hint)
+        raise DataError(f"{path} is JSON, which import cannot read", hint=hint)
     low, high = start[:20:2], start[1:20:2]
     if high and not any(high) and all(low):  # without its mark
         return "utf-16-le"

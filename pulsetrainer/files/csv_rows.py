@@ -91,7 +91,7 @@ def _of_a_comma(cells: Sequence[str]) -> str:
     if not pairs:
         return ""
     comma, point = ",".join(pairs[-1]), ".".join(pairs[-1])
-    return f"if {comma} is a decimal comma, write {point}, or part the columns by semicolons"
+    return f"if {comma} is a decimal comma, write {point}, or separate the columns by semicolons"
 
 
 class _Kept:

@@ -146,7 +146,11 @@ def _names_in(folder: Path, path: Path) -> str:
     near = near or [name for name in names if path.suffix and name.endswith(path.suffix)]
     offered = ", ".join(file.name for file in _offered(folder / name for name in near))
     where = "here" if folder == Path() else f"in {folder}"
-    return f"files {where}: {offered}" if offered else f"no file {where} has a similar name: give its path"
+    return (
+        f"files {where}: {offered}"
+        if offered
+        else f"check the name, or give the full path: no file {where} has a similar one"
+    )
 
 
 def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
@@ -251,7 +255,8 @@ def name_columns(table: Path, options: Mapping[int, str], missing: str) -> tuple
     """
     try:
         columns = columns_of(table)
-        said, like = f"{missing}; {table} has {', '.join(columns)}", "name one for each, "
+        one = "name one for each" if len(options) > 1 else "name its column"
+        said, like = f"{missing}; {table} has {', '.join(columns)}", f"{one}, "
     except DataError as error:
         columns = ("1", "2", "3")
         said, like = f"{error.message}; and {missing}", f"{error.hint}; and name the columns, "
@@ -264,7 +269,7 @@ def check_resumable(path: Path) -> None:
     """Raise UsageError where of a recording into ``path`` nothing is there, nor beside it, to be resumed."""
     if (kind := likely_kind(path)) not in ("run", ""):
         raise UsageError(
-            f"there is nothing to resume: {path} is a {kind}, no interrupted recording",
+            f"there is nothing to resume: {path} is a {kind}, not an interrupted recording",
             hint="name the recording that broke off, or leave --resume out and name another output",
         )
     if not path.exists() and not any(path.parent.glob(f"{glob.escape(path.name)}.partial*")):

@@ -230,8 +230,8 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     heading = table.heading(column)
     if split_unit(heading)[1]:
         return check_unit(own, what, f"the heading {heading!r} of {table.path}")
-    where = f"the line below the heading {heading!r} of {table.path}, which was taken for units,"
-    return check_unit(own, what, where, "keep one line of headings, or ")
+    where = f"the second line of headings of {table.path}, which should hold units, below {heading!r},"
+    return check_unit(own, what, where, "delete one of the two lines, or ")
 
 
 def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:

@@ -138,7 +138,7 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
             f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
             hint=f"write the number with a point: {comma[1]}.{comma[2]}"
             if comma
-            else "put a name with backslashes into single quotes"
+            else "put text with backslashes in single quotes"
             if "\\" in line
             else f"write it as TOML, one {what.rstrip('s')} a line, such as: {_TOML_LINES[what]}",
         ) from error

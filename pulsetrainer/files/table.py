@@ -176,7 +176,9 @@ class Table:
             heading = f"{split_unit(self.names[k])[0]} [{found[1]}]"
             hint = f"remove the unit from the cells, and write it in the heading: {heading!r}"
             if (own := self.units.get(self.names[k])) and own != symbol_of(found[1]):
-                hint = f"the heading says {own}: write the numbers in {own}, not in {found[1]}, and alone"
+                hint = (
+                    f"the heading says {own}: write the numbers in {own}, not in {found[1]}, as plain numbers"
+                )
         said = f"{self.path} has text, not numbers, in {column_words(self.names[k])}"
         return DataError(f"{said}: {quoted(cell)} in {self.place(0)}", hint=hint)
 
@@ -185,7 +187,7 @@ class Table:
         same = [own for own in self.names if own.lower().startswith(f"{split_unit(name)[0].lower()}#")]
         if name.strip() and same:
             return DataError(
-                f"{self.path} has no column {name!r} alone: {len(same)} columns have that heading, and are "
+                f"{self.path} has {len(same)} columns with the heading {name!r}; they are "
                 f"called {', '.join(same)}",
                 hint=f"name one of them: {' or '.join(map(repr, same))}",
             )

@@ -162,10 +162,9 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         other = ", choose another `time` column, or give a `rate_Hz`" * of_record
         if not split_unit(table.heading(name))[1] and name in table.units:
             raise DataError(
-                f"{unit!r} in the line below the heading {name!r} of {table.path} was taken for the unit "
-                f"of the time, and is none: {expected}",
-                hint="if that line holds headings again, delete it; if it holds the units, correct this one"
-                + other,
+                f"{table.path} has two lines of headings; the second should hold units, but {unit!r} below "
+                f"{name!r} is not a unit of time, {expected}",
+                hint=f"delete one of the two lines, or correct {unit!r} if the second does hold units",
             )
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, {expected}",

@@ -20,7 +20,7 @@ from pulsetrainer.artefacts import (
     Session,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import counted, same_units, units_alike, units_of, with_seconds
+from pulsetrainer.artefacts.units import counted, in_units, same_units, units_alike, with_seconds
 from pulsetrainer.core import metrics, wild
 from pulsetrainer.core.initial_state import estimated_start, known_from, left_out_words, second_stroke
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -163,7 +163,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
     for title, model in zip(model_names, models, strict=True):
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
-                f"{title} was identified in {units_of(model)}, but {name} is in {units_of(run)}",
+                f"{title} {in_units(model)}, but {name} {in_units(run)}",
                 hint=units_alike(title, model, name, run, "give a model of the device of that run")
                 or "use a model of the same device; in other units, convert the columns and import again",
             )

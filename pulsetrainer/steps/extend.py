@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Model, Run
-from pulsetrainer.artefacts.units import same_units, units_of
+from pulsetrainer.artefacts.units import in_units, same_units
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.evaluate import evaluate
@@ -82,11 +82,12 @@ def extend(
 
 def _check_of(model: Model, verify: Run | Model, name: str) -> None:
     """Refuse a run to verify with that is of another device than the model."""
-    is_of, of = (verify.serial, model.serial) if verify.serial and model.serial else ("", "")
+    known = verify.serial and model.serial
+    is_of, of = (f"is of {verify.serial}", f"is of {model.serial}") if known else ("", "")
     if not same_units((verify.input_unit, verify.output_unit), (model.input_unit, model.output_unit)):
-        is_of, of = units_of(verify), units_of(model)
+        is_of, of = in_units(verify), in_units(model)
     if is_of != of:
-        said = f"the run to verify with is of {is_of}, but {name} of {of}"
+        said = f"the run to verify with {is_of}, but {name} {of}"
         raise DataError(said, hint="give a run of the same device")
 
 

@@ -68,10 +68,11 @@ def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:
         return None
     if asked and model.coil is None:
         raise DataError(
-            "the model does not know the resistance of its coil, so no heat can be tracked: its run was too "
-            "short, or had pauses, or the firmware is older than protocol 2.2",
-            hint="leave `track_heat` out, or make the model anew from a run of a minute or more: "
-            "pulsetrainer capture identification -o long.h5",
+            "the model holds no resistance of its coil, so no heat can be tracked: its run was shorter than "
+            "a minute, had pauses, or came from firmware older than protocol 2.2",
+            hint="leave `track_heat` out, or make a new model and a drive of it: pulsetrainer capture "
+            "identification -o long.h5, then pulsetrainer identify long.h5 -o long-model.h5, then "
+            "pulsetrainer invert normal --model long-model.h5 -o long-drive.h5",
         )
     return model.coil
 

@@ -12,11 +12,11 @@ import numpy as np
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import (
     counted,
+    in_units,
     quantity_in_words,
     same_units,
     shown,
     units_alike,
-    units_of,
     with_unit,
 )
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
@@ -198,7 +198,7 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
     for name, run in zip(names, runs, strict=True):
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
-                f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
+                f"{name} {in_units(run)}, but {names[0]} {in_units(first)}",
                 hint=units_alike(name, run, names[0], first, "identify the runs one by one")
                 or "identify runs of different devices one by one; of one device, convert the columns of "
                 "the tables and import them again",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pulsetrainer.artefacts import BoolArray, FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import BLOCK, GAP, gaps_of, steps_of
-from pulsetrainer.artefacts.units import counted, same_units, units_of, with_seconds, with_unit
+from pulsetrainer.artefacts.units import counted, in_units, same_units, with_seconds, with_unit
 from pulsetrainer.core import held, input_noise
 from pulsetrainer.core.coverage import coverage, little_words, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
@@ -266,7 +266,7 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
     for part in parts[1:]:
         if not same_units((part.input_unit, part.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
-                f"{part.signal} is in {units_of(part)}, but {first.signal} is in {units_of(first)}",
+                f"{part.signal} {in_units(part)}, but {first.signal} {in_units(first)}",
                 hint="give `input_unit` and `output_unit`, or import them one by one",
             )
         for name in ("time_s", "reference"):

@@ -309,9 +309,9 @@ def _force_range(
             f"{model.output_quantity} from {low:.4g} to {with_unit(f'{high:.4g}', unit)} is asked for, but "
             f"{name} reaches {reach[0]:.4g} to {with_unit(f'{reach[1]:.4g}', unit)}"
             + (f": {part.limits(model)}" if model.form == "signed" else ""),
-            hint=f"choose `force_min` and `force_max` inside, such as "
-            f"`force_min` {np.ceil(reach[0] / step) * step:g} "
-            f"`force_max` {np.floor(reach[1] / step) * step:g}",
+            hint="stay inside, such as "
+            + f"`force_min` {np.ceil(reach[0] / step) * step:g} " * (force_min is not None)
+            + f"`force_max` {np.floor(reach[1] / step) * step:g}" * (force_max is not None),
         )
     return low, high
 

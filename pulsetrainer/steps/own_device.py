@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pulsetrainer.artefacts import Model, Waveform
-from pulsetrainer.artefacts.units import as_parameters, units_of
+from pulsetrainer.artefacts.units import as_parameters, in_units
 from pulsetrainer.device.device import Device
 from pulsetrainer.errors import DataError
 
@@ -21,8 +21,9 @@ def check_units(noun: Model | Waveform) -> None:
     hint = _ANEW[what]
     if "1" in units:
         raise DataError(
-            f"the {what} is in {units_of(noun)}, expected A and N",
-            hint=f"import its table again with {as_parameters('A', 'N')}, and {again}; or {hint}",
+            f"the {what} {in_units(noun)}, expected A and N",
+            hint=f"if the table it was made from is in A and N: import it again with "
+            f"{as_parameters('A', 'N')}, and {again}; otherwise {hint}",
         )
     if units != ("A", "N"):
         raise DataError(

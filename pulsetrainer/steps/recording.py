@@ -273,7 +273,7 @@ def check_cooling(reference_A: FloatArray, signal: excitations.Signal) -> None:
     """Raise ArgumentError for a piece (n,) in A of a recording that even a cold coil does not bear."""
     hint = f"play less of {signal.name} at a time, or at a lower current"
     if signal.name in EXCITATIONS:
-        hint = "give fewer `levels` or `repeats`, or a lower `current_max_A`; with few levels a higher "
+        hint = "give fewer `levels` or `repeats`, or a lower `current_max_A`; with few levels, a higher "
         hint += "`speed_A_per_s` helps too"
     check_ever_cool(reference_A, signal.rate_Hz, hint)
 

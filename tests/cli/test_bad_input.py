@@ -362,7 +362,7 @@ def test_what_was_measured_is_never_the_output(ready, words):
         (["--settings", "mine.json", "ports"], 2, "TOML"),
         (["--settings", "mine.toml", "ports"], 2, "current_A = 1.5 under [limits]"),
         (["diagnose", "played.h5", "--model", "model.h5", *OUT], 3, "evaluate played.h5"),
-        (["play", "normal", *OUT], 3, "normal is a pulse: pulsetrainer invert normal"),
+        (["play", "normal", *OUT], 3, "make a drive of it: pulsetrainer invert normal"),
         (["play", "absent.h5", *OUT], 3, "drive files here: drive.h5"),
         (["show", "normal"], 3, "pulsetrainer files here: "),
         (["identify", "run.h5", "--levels", "many", *OUT], 2, "leave it out, or see pulsetrainer identify"),

@@ -84,7 +84,7 @@ def test_a_slip_in_the_file_is_told_with_its_remedy(run, tmp_path, text, then):
     [
         (
             "levels = 1\n",
-            "levels in pulsetrainer.toml (for --levels) must be a whole number, 2 or more, got 1",
+            "levels in pulsetrainer.toml (for --levels) must be a whole number from 2 to 10000, got 1",
         ),
         ('port = ""\n', "port in pulsetrainer.toml (for --port) must name a port, got nothing"),
         ("[limits]\nforce_N = 500\n", "(limits.force_N in pulsetrainer.toml)"),

@@ -105,9 +105,9 @@ def test_forces_that_are_proposed_are_within_reach(unit):
     plane = Plane.uniform(0.0, 1.0, 8)
     model = pt.Model(plane.edges, np.full(plane.n_q, 7.0 * unit), 7.2345 * unit, np.ones(plane.n_q, bool))
     with pytest.raises(DataError) as refused:
-        pt.invert("normal", model, force_max=100.0 * unit)
+        pt.invert("normal", model, force_min=-100.0 * unit, force_max=100.0 * unit)
     words = refused.value.hint.split()
-    low, high = (float(words[words.index(name, 5) + 1]) for name in ("`force_min`", "`force_max`"))
+    low, high = (float(words[words.index(name) + 1]) for name in ("`force_min`", "`force_max`"))
     assert high - low > 0.95 * 7.0 * unit
     assert pt.invert("normal", model, force_min=low, force_max=high).clipped_samples == 0
 

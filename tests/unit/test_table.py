@@ -605,7 +605,7 @@ def test_columns_of_one_heading_are_numbered(table):
     np.testing.assert_array_equal(read.column("Volt#2"), [2, 4])
     assert read.unit("Volt#1") == "V"
     for near in ("Volt#1 (V)", "Volt#2 (V)"):
-        with raises(DataError, "nearest column", asked="Volt", has="Volt#1 (V)", near=near):
+        with raises(DataError, "several columns", asked="Volt", has="Volt#1 (V)", near=near):
             read.column("Volt")
 
 
@@ -1000,7 +1000,10 @@ def test_a_column_is_found_with_its_unit_written_otherwise(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "hint"),
-    [("zzzz.csv", "files in {}: a.csv"), ("zzzz", "no file in {} has a similar name: give its path")],
+    [
+        ("zzzz.csv", "files in {}: a.csv"),
+        ("zzzz", "check the name, or give the full path: no file in {} has a similar one"),
+    ],
 )
 def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hint):
     """Where no name is alike: of a table the tables, of a name without an ending the artefacts."""

@@ -13,6 +13,7 @@ from pulsetrainer.artefacts.units import (
     SECONDS,
     check_unit,
     counted,
+    in_units,
     is_unit,
     more_easily,
     same_units,
@@ -20,7 +21,6 @@ from pulsetrainer.artefacts.units import (
     split_unit,
     symbol_of,
     unit_of,
-    units_of,
     with_seconds,
 )
 from pulsetrainer.errors import DataError
@@ -365,10 +365,15 @@ def test_micro_is_one_prefix_however_it_is_spelled(ours, theirs, same):
 
 @pytest.mark.parametrize(
     ("units", "said"),
-    [("A N", "A and N"), ("1 1", "no units"), ("V 1", "V and no unit"), ("A m^2", "A and m²")],
+    [
+        ("A N", "is in A and N"),
+        ("1 1", "has no units"),
+        ("V 1", "is in V and no unit"),
+        ("A m^2", "is in A and m²"),
+    ],
 )
 def test_the_units_of_a_run_in_words(units, said):
     """A table without units was told to be in 1 and 1."""
     of_input, of_output = units.split()
     run = pt.Run(None, np.zeros(2), np.zeros(2), input_unit=of_input, output_unit=of_output)
-    assert units_of(run) == said
+    assert in_units(run) == said
