@@ -33,7 +33,7 @@ _CLOCKS = frozenset(["utc", "gmt", "local", "epoch", "unix", "1"])
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
-_IN_SECONDS = " in s"  # the heading that `diagnose` asks for: whole seconds under it count no rows
+_SUFFIX = "_s"  # under it rows are counted, too, as in the licensed loops of steel; not under 'time [s]'
 _SLOW_S, _MANY = 0.2, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
@@ -68,9 +68,8 @@ def time_of(
             lack = f"{table.path} has no {other}time column{unread}"
             return _counted(table, lack, remedy, whole=table is whole)
         time = table.names[place]
-        # no row is counted in ms; the licensed t_s of seconds does count rows
-        counts = _just_counts(whole.columns[time]) and unit_of_time(table, time) in ("", "s")
-        if counts and not time.endswith(_IN_SECONDS):
+        counts = _just_counts(whole.columns[time])
+        if counts and (not (unit := unit_of_time(table, time)) or (unit == "s" and time.endswith(_SUFFIX))):
             lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
     heading = table.heading(time)

@@ -256,7 +256,10 @@ def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, 
     assert [one["report"]["samples"] for one in done.json["runs"]] == [part.size for part in parts]
 
 
-@pytest.mark.parametrize(("heading", "rate_Hz"), [("t/ms", 1000.0), ("time [us]", 1e6), ("t (min)", 1 / 60)])
+@pytest.mark.parametrize(
+    ("heading", "rate_Hz"),
+    [("t/ms", 1000.0), ("time [us]", 1e6), ("t (min)", 1 / 60), ("time [s]", 1.0), ("Zeit in Sekunden", 1.0)],
+)
 def test_a_time_of_whole_steps_in_another_unit_is_no_count(run, tmp_path, heading, rate_Hz):
     """A sample each millisecond counts 0, 1, 2 as rows do; its heading says what it is."""
     t = np.arange(400)
