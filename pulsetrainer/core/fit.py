@@ -7,7 +7,7 @@ offset for each record where their outputs differ by a constant.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -85,11 +85,12 @@ def fit(
     form: Form | Literal["auto"] = "direct",
     kept: Kept = None,
     levels: Plane | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
     For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output. They are
-    chosen by the records, unless the ``levels`` are given.
+    chosen by the records, unless the ``levels`` are given. ``progress`` is told how far a large fit is, 0..1.
 
     Errors are those of ``identification.identify``; ArgumentError also for relays, or the alternating method,
     with another form than direct.
@@ -112,7 +113,9 @@ def fit(
         records = records_of(moved, low, high, kept)
 
     def on(levels: Plane) -> Fitted:
-        found = identify(records, levels, reading=reading, method=method, smoothing=smoothing)
+        found = identify(
+            records, levels, reading=reading, method=method, smoothing=smoothing, progress=progress
+        )
         return Fitted(found, tuple(records), offsets)
 
     fitted = on(plane)

@@ -10,7 +10,7 @@ weights that the data do not ask for are zero.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isqrt
 from typing import Literal
@@ -106,6 +106,7 @@ def identify(
     polarity: int | None = None,
     smoothing: Smoothing = 0.0,
     signed: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Identified:
     """Fit weights mu >= 0 and a free offset to one or several records.
 
@@ -116,7 +117,8 @@ def identify(
     clipped. ``polarity`` is 1, -1, or None to detect it. ``smoothing`` is the length s, share of the input's
     range, below which features of the density are smoothed away; 0 for none; "auto" to choose it by held-out
     blocks (see ``core.smoothing``). ``signed`` weights may be of either sign: plain regularised least
-    squares, at least ``LEAST_SIGNED`` smooth.
+    squares, at least ``LEAST_SIGNED`` smooth. ``progress`` is told the share of the work of ``large.solve``
+    that is done.
 
     ArgumentError for no records, no sample that counts, an input or an output that does not vary, fewer
     samples than levels, an unknown method, a smoothing out of range, or ``method="alternating"`` on a plane
@@ -131,7 +133,7 @@ def identify(
     choice = choose(turned, plane, reading) if smoothing == "auto" else Choice(smoothing, ())
     length, stiffness = choice.smoothing, 0.0
     if not fits_dense(plane):
-        masses, offset, iterations, kkt = _fit_large(turned, plane, reading, method, length)
+        masses, offset, iterations, kkt = _fit_large(turned, plane, reading, method, length, progress)
     else:
         equations = normal_equations(plane, turned, reading)
         masses, offset, iterations, kkt = _fit_dense(equations, method, length, 0.0)
@@ -283,7 +285,12 @@ def _fit_dense(equations: NormalEquations, method: Method, smoothing: float, sti
 
 
 def _fit_large(
-    records: Sequence[Record], plane: Plane, reading: Reading, method: Method, smoothing: float
+    records: Sequence[Record],
+    plane: Plane,
+    reading: Reading,
+    method: Method,
+    smoothing: float,
+    progress: Callable[[float], None] | None,
 ) -> _Fitted:
     """Fit without any dense matrix."""
     if method != "joint":
@@ -292,7 +299,7 @@ def _fit_large(
             f"{DENSE_BYTES / 1e9:.0f} GB",
             hint="use the joint method: it ends at the same point",
         )
-    return large.solve(node_sums(plane, records, reading), smoothing)
+    return large.solve(node_sums(plane, records, reading), smoothing, progress=progress)
 
 
 def _alternate(equations: NormalEquations, gram: FloatArray) -> tuple[FloatArray, float, int]:

@@ -67,6 +67,9 @@ comes and goes: What is left comes and goes, or jumps. Record the same again and
     else acts on it. Until then use the model as it is.
 another kind: The device does the same again, so no other recording helps: a model of this kind does not
     follow it further. Use the model if what it leaves does not matter to you, or a model of another kind.
+no model: No model of this program follows this device much further, as far as these recordings show. Use it
+    for inputs like those recorded if what it leaves there does not matter to you, or take a model of another
+    kind. Recordings at other rates, and with rests, show whether time has to do with it.
 something acts: Something that is not in these recordings acts on the device or the sensor. Vary one thing at
     a time, such as temperature, load or supply, and record the same again each time. Then keep what matters
     as it is, and identify the model from a recording in which it was.
@@ -81,10 +84,10 @@ none, correct: Nothing in this recording calls for another model: {names} can be
     noise. Use the model as it is. To take that out too, go on with pulsetrainer correct.
 in the model: The model as given contains {names} already, and fitted again to these recordings it would be
     hardly better: use it as it is.
-none, small: Nothing that matters was found in this recording: noise alone is unlikely to look like {names},
-    but it is too small to matter, or does not predict what was left out of the fit. Use the model as it is.
-none, small, quick: Nothing that matters was found in this recording: noise alone is unlikely to look like
-    {names}, but it is too small to matter.
+none, small: Nothing that matters was found in this recording. What is left looks a little like {names}, but
+    that is too small to matter, or does not predict what was left out of the fit. Use the model as it is.
+none, small, quick: Nothing that matters was found in this recording. What is left looks a little like
+    {names}, but that is too small to matter.
 extend, quick: Run the full diagnosis, which fits what was found: a quick screen fits nothing that a model
     could be extended by, or that could be taken out of the recording.
 too noisy: {keep} These recordings could not have shown {names} as small as {matters:.2g} % of the span. If
@@ -109,12 +112,12 @@ rest first: The device was still settling when these recordings began, or had ne
     that: what was found can then be added to the model. The rest need not be recorded.
 again: What was found is in doubt, or does not repeat within these recordings, so nothing is added to the
     model. Record the same again, and diagnose both recordings together.
-correct: The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer correct).
-    If the model was identified from it, identify it again from the corrected one; a model from a sound
-    recording stays as it is.
-correct, extend: The measurement is at fault, and the device does something that the model lacks. First take
-    {names} out of the recording (pulsetrainer correct). If the model was identified from it, identify it
-    again from the corrected one. Then diagnose the corrected recording, and extend the model.
+correct: What was found is most likely a fault of the measurement, not of the model: take {names} out of the
+    recording (pulsetrainer correct). If the model was identified from it, identify it again from the
+    corrected one; a model from a sound recording stays as it is.
+correct, extend: The measurement is most likely at fault, and the device does something that the model lacks.
+    First take {names} out of the recording (pulsetrainer correct). If the model was identified from it,
+    identify it again from the corrected one. Then diagnose the corrected recording, and extend the model.
 conditions: The recordings were made in different conditions, such as load, zero or gain: the evidence says
     which of them the model as given predicts. Put the others right, or identify a model for each condition.
 out of range: The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a

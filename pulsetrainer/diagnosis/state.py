@@ -37,6 +37,11 @@ class Given:
     fingerprints: tuple[str, ...] = ()  # of the records
     names: tuple[str, ...] = ()  # of the records, as a person knows them; empty: they are numbered
 
+    @property
+    def is_of_wrong_kind(self) -> bool:
+        """Whether the model itself says that no model of its kind describes the device."""
+        return self.model.fit is not None and bool(self.model.fit.warning)
+
 
 @dataclass(frozen=True)
 class Question:

@@ -42,9 +42,9 @@ comes again: In two of these recordings the {input} is the same, and {share:.0f}
 differs: In two of these recordings the {input} is the same, but {share:.0f} % of what is left differs
     (squared, beyond noise). So it does not come from the {input}: something that was not recorded acts on the
     device or the sensor
-not accepted: Noise alone is unlikely to look like {names} (p = {p:.3f}). But when it is fitted together with
-    the model, it is too small to matter, or it does not predict the parts of the recordings that were left
-    out. So it is not named.
+not accepted: What is left looks more like {names} than noise alone does (p = {p:.3f}), as small errors of the
+    model do, too. When it is fitted together with the model, it is too small to matter, or it does not
+    predict the parts of the recordings that were left out. So it is not named.
 held: it would account for {share:.1f} % of the squared error beyond noise, but the weights of a model fitted
     to these recordings can absorb nearly all of such a fault. So these recordings show neither how large it
     is nor whether it is there, and it is not named. To find out, diagnose another recording together with
@@ -71,7 +71,7 @@ given worse: The model as given leaves {given:.2f} % of the span (rms of single 
     these recordings leave {refitted:.2f} %. It does not carry over: the device, its zero or its sensor was
     not the same when it was identified, or a model of this kind does not describe the device
 given worse, own: The model as given leaves {given:.2f} % of the span (rms of single samples); weights
-    refitted to these recordings leave {refitted:.2f} %, although it was identified from them. Free weights
+    refitted to these recordings leave {refitted:.2f} %, although it comes from them. Free weights
     follow something that smooth ones do not, which need not be hysteresis: it may be a slow drift. A model
     from another recording would show which
 one stroke: The model as given leaves {given:.2f} % of the span, but the {input} never turns in these

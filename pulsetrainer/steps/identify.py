@@ -135,7 +135,15 @@ def identify(
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
     n_h = _levels(measured, notes) if levels is None else levels
-    on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
+    on = partial(
+        fit,
+        n_h=n_h,
+        reading=reading,
+        method=method,
+        smoothing=smoothing,
+        form=form,
+        progress=lambda share: progress(0.1 + (0.3 if bootstrap else 0.7) * share),
+    )
     sure = [t.wild_input | m for t, m in zip(tamed, masked, strict=True)]
     rest = left_out.fit_to_the_rest(
         on, reach, measured, sure, [t.wild_output for t in tamed], [part.output for part in raw]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from core_jobs import curves, plant, random_reversals
 
+import pulsetrainer as pt
 from pulsetrainer.core import identification, large, nnls
 from pulsetrainer.core.equations import node_sums
 from pulsetrainer.core.identification import identify
@@ -149,3 +150,31 @@ def test_units_do_not_matter(unit, zero):
     assert there.iterations == here.iterations
     np.testing.assert_allclose(there.masses, unit * here.masses, rtol=1e-5, atol=1e-8 * unit)
     assert there.offset == pytest.approx(zero + unit * here.offset, abs=1e-6 * unit)
+
+
+def test_progress_rises_to_nearly_all_of_the_usual_steps():
+    """A fit of minutes says how far it is, once a Newton step."""
+    rng = np.random.default_rng(5)
+    plane = Plane.uniform(0.0, 1.0, 30)
+    record = Record(rng.random(3000), rng.random(3000))
+    told: list[float] = []
+    solved = large.solve(node_sums(plane, [record], "continuous"), 0.02, progress=told.append)
+    assert len(told) == solved.iterations
+    assert told == sorted(told)
+    assert told[0] == 0.0
+    assert 0.3 < told[-1] <= 1.0
+
+
+def test_identify_passes_on_how_far_a_large_fit_is():
+    """From a tenth, which the cleaning took, to what is left for the words."""
+    u = curves(2000, 20, 20)
+    told: list[float] = []
+    pt.identify(
+        pt.Run(time_s=np.arange(u.size) / 100, input=u, output=plant(60)(u)),
+        levels=90,
+        smoothing=0.03,
+        progress=told.append,
+    )
+    assert told[0] == 0.1
+    assert len({share for share in told if 0.1 < share < 0.8}) > 5
+    assert told[-1] == 1.0

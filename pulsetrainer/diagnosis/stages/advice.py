@@ -110,7 +110,11 @@ def _of_the_conditions(state: State) -> Evidence | None:
 def _not_as_given(state: State) -> Evidence | None:
     """Return what to do if nothing was found, but the given model leaves more than refitted weights do."""
     missed = next((one.kind for one in state.evidence if one.kind in _NOT_AS_GIVEN), None)
-    if missed is None or state.verdict not in ("none", "inconclusive", "unknown"):
+    if state.verdict not in ("none", "inconclusive", "unknown"):
+        return None
+    if state.verdict == "unknown" and state.question.given and state.question.given.is_of_wrong_kind:
+        return Evidence("no model")
+    if missed is None:
         return None
     own = missed == "given worse, own"
     return Evidence(_NOT_AS_GIVEN[missed]) if own or state.verdict != "unknown" else None

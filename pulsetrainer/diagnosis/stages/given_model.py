@@ -20,6 +20,8 @@ records.
   stroke differs from all later ones: `none` becomes `inconclusive`.
 - If it is far off although it was identified from these very records, nothing can have changed since. Without
   a cause found, the verdict is then `unknown`.
+- If it says itself that no model of its kind describes the device, and leaves a relevant error here too, the
+  verdict is `unknown` without a cause found.
 - If it is far off for none of these reasons, the device is in another condition, and `condition-change` comes
   first. If that change is all but a thousandth of the squared error, other causes would only repair the rest
   of it, and are withdrawn.
@@ -60,6 +62,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 _CHANGED, _SPEED = "condition-change", "viscous"
 _NOTHING = ("none", "inconclusive", "unknown")
+_OF_WHAT_IS_LEFT = ("slow noise", "bursts", "not accepted")  # evidence of these kinds
 
 
 def stage(state: State) -> State:
@@ -81,7 +84,7 @@ def stage(state: State) -> State:
         state = _of_another_kind(state, judged)
     elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
-        state = withdrawn(state, state.by_contrast)
+        state = _without_errors_of_its_own(withdrawn(state, state.by_contrast), judged)
         blind = state.blind and state.lacks and not state.question.quick
         if state.verdict == "none" and (_unexplained(state, judged) or blind):
             state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
@@ -102,11 +105,17 @@ def _wrong_kind(state: State, judged: Judged) -> bool:
     return judged.speed.wrong and with_causes > LIMITS.kind_share * judged.speed.velocity
 
 
+def _misfits(state: State, judged: Judged) -> bool:
+    """Whether the model as given says that it is of the wrong kind, and leaves a relevant error here too."""
+    assert state.question.given is not None
+    left = _left_by_given(state, judged)
+    return state.question.given.is_of_wrong_kind and left > LIMITS.matters * float(np.ptp(judged.measured))
+
+
 def _changed(state: State, judged: Judged) -> Change | None:
     """Return how the device changed since its model was made; None if it did not, or if nothing shows it."""
     assert state.question.given is not None
-    fit = state.question.given.model.fit
-    if _wrong_kind(state, judged) or (fit is not None and fit.warning):
+    if _wrong_kind(state, judged) or state.question.given.is_of_wrong_kind:
         return None
     refitted = state.scale.span * state.baseline.rms
     changed = against_model(judged.measured, judged.predicted, refitted, judged.noise)
@@ -139,6 +148,8 @@ def _is_one_stroke(u: FloatArray) -> bool:
 
 def _carried(state: State, judged: Judged) -> tuple[State, list[Evidence]]:
     """Say what is known of the model as given where no other condition shows."""
+    if state.verdict in _NOTHING and _misfits(state, judged):
+        return replace(state, verdict="unknown"), []
     said = _not_carried(state, judged)
     if not said or is_its_own(state):
         return state, said
@@ -240,6 +251,13 @@ def _is_as_good(state: State, judged: Judged) -> bool:
     else:
         left = _left_by_given(state, judged)
     return left <= state.scale.span * state.left_rms
+
+
+def _without_errors_of_its_own(state: State, judged: Judged) -> State:
+    """Return the state without what it says of what is left, if that is mostly an error of coarser levels."""
+    if _left_by_given(state, judged) > 0.5 * state.scale.span * state.baseline.rms:
+        return state
+    return replace(state, evidence=tuple(one for one in state.evidence if one.kind not in _OF_WHAT_IS_LEFT))
 
 
 def _left_by_given(state: State, judged: Judged) -> float:

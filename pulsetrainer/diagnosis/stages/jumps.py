@@ -7,8 +7,10 @@ longer fires.
 The other way round, some sticking shows only in what the model leaves: sticking that is smaller than the
 noise, or that was recorded at one rate only. If more is left there than noise from sample to sample, by a
 relevant amount, the residual is searched for it (decision 044). Jumps that are not far larger than the coarse
-steps of the output are those steps. What was already taken out of a record (`correct`) is not tested again,
-and neither is what remains of it: coarse steps that were smoothed still have flat runs.
+steps of the output are those steps. Nor is it searched if the model as given says that no model of its kind
+describes the device: the errors of such a model come again on every stroke, as jumps do. What was already
+taken out of a record (`correct`) is not tested again, and neither is what remains of it: coarse steps that
+were smoothed still have flat runs.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ def stage(state: State) -> State:
     kept = tuple((k, firing) for k, firing in state.firings if not _explained(state, k, firing))
     state = replace(state, firings=kept)
     floor = state.floor.quick  # jumps are heard as slow noise
-    if state.current.squares - floor.squares <= floor.relevant:
+    given = state.question.given
+    if state.current.squares - floor.squares <= floor.relevant or (given and given.is_of_wrong_kind):
         return state
     out = taken_out(name for one in state.question.corrected for name in one)
     out |= {firing.cause for _, firing in kept}

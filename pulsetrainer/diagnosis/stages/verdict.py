@@ -17,7 +17,8 @@ Some findings are reported, but never become the verdict:
 - a hum no larger than the noise;
 - steps that noise averages out;
 - a drift or step no larger than slow noise, or a cause that may be such a one;
-- a cause that is in doubt (`rivals`, `repetition`, `begin`).
+- a cause that is in doubt (`rivals`, `repetition`, `begin`), unless the doubt is of its size only: a
+  parameter at the end of the range that was searched.
 
 All branches of a loop may pass through one point within it, as those of a memristor do. No Preisach operator
 has such a loop, and any cause explains some of it. Anything left beyond the noise from sample to sample is
