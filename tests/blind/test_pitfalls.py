@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -373,3 +374,60 @@ def test_at_one_rate_no_memory_in_time_is_named_for_a_device_without(seed):
     """The loops of a Jiles-Atherton device have a shape that looks like creep there."""
     seen = _at_one_rate(lambda u, _: foreign.jiles_atherton(u, np.random.default_rng(seed)), 0.6)
     assert pt.diagnose([seen], pt.identify(seen)).verdict in ("unknown", "inconclusive")
+
+
+def _plays(u, radii):
+    """Outputs (n, k) of plays of these radii, from rest at zero."""
+    y = np.empty((u.size, radii.size))
+    now = np.zeros(radii.size)
+    for k, value in enumerate(u):
+        now = np.clip(now, value - radii, value + radii)
+        y[k] = now
+    return y
+
+
+def _ramps(levels, step):
+    """A path through levels, in steps of this size."""
+    pieces = [np.arange(a, b, step if b > a else -step) for a, b in pairwise(levels)]
+    return np.concatenate(pieces)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.005, 0.001])
+def test_the_square_of_what_lags_does_not_stick(noise):
+    """No form follows it: what a model leaves comes again on every stroke, but nothing jumps."""
+    rng = np.random.default_rng(33)
+    back = [x for low in (-2, -1.5, -1.2, -1, -0.8, -0.5) for x in (2, low)]
+    up = [x for high in (0.5, 0.8, 1.0, 1.2, 1.5, 2) for x in (-2, high)]
+    u = _ramps([0, 2, -2, *back, 2, *up, -2, 0], 0.025)
+    radii = np.linspace(0.2, 1.2, 21)
+    weights = np.exp(-(((radii - 0.8) / 0.25) ** 2))
+    lags = 0.35 * np.tanh(_plays(u, radii) / 0.35) @ weights / weights.sum() + 0.02 * u
+    y = 2.2 * lags**2
+    y = y + rng.normal(0.0, noise * np.ptp(y), y.size)
+    run = pt.Run(time_s=0.05 * np.arange(u.size), input=u + rng.normal(0.0, 0.002, u.size), output=y)
+    found = pt.diagnose(run, pt.identify(run))
+    assert found.verdict == "unknown"
+    assert not found.found
+    assert found.advice[0].startswith("No model of this program follows this device much further")
+
+
+@pytest.mark.slow
+def test_the_error_of_even_levels_is_no_slow_noise():
+    """A soil gives up its water over decades of suction: there the levels of its model crowd."""
+    rng = np.random.default_rng(61)
+    inner = (2.9, 0.8, 2.6, 1.1, 2.3, 1.4, 2.0, 0.3, 2.9, 1.8, 2.9, 1.3, 2.9, 0.8, 2.9)
+    turns = [0.3, 2.9, 0.3, *inner, 0.3, 1.2, 0.3, 1.6, 0.3, 2.0, 0.3, 2.4, 0.3, 2.9, 0.3]
+    decades = _ramps(turns, 0.01)
+    radii = np.linspace(0.02, 0.45, 12)
+    weights = np.exp(-(((radii - 0.2) / 0.12) ** 2))
+    suction = 10.0 ** (_plays(decades, radii) @ weights / weights.sum())
+    water = 4.0 + 38.0 * (1.0 + (0.02 * suction) ** 1.9) ** (1.0 / 1.9 - 1.0)
+    water += rng.normal(0.0, 0.003 * np.ptp(water), water.size)
+    measured = 10.0**decades * (1.0 + rng.normal(0.0, 0.005, water.size))
+    run = pt.Run(time_s=600.0 * np.arange(water.size), input=measured, output=water)
+    model = pt.identify(run)
+    assert "levels lie closer" in " ".join(model.fit.notes)
+    found = pt.diagnose(run, model)
+    assert not found.found
+    assert "taken for noise here is slow" not in " ".join(found.evidence)
