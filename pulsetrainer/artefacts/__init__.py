@@ -5,7 +5,7 @@ from __future__ import annotations
 from pulsetrainer.artefacts.data import LARGEST, Attribute, BoolArray, Data, FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.diagnosis import Cause, Dependence, Diagnosis, Profile, Recorded
 from pulsetrainer.artefacts.evaluation import DriveError, Evaluation, ModelEvaluation, WaveformEvaluation
-from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
+from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter, Seen
 from pulsetrainer.artefacts.playback import DrivePlayback, Playback
 from pulsetrainer.artefacts.run import Run
 from pulsetrainer.artefacts.session import Beats, Quiz, Score, Session
@@ -15,7 +15,7 @@ __all__ = [
     "KINDS", "LARGEST", "Attribute", "Beats", "BoolArray", "Cause", "Data", "Dependence", "Diagnosis",
     "DriveError", "DrivePlayback", "Evaluation", "Extension", "Fit", "FloatArray", "Model",
     "ModelEvaluation", "Parameter", "Playback", "Profile", "Quiz", "Recorded", "RefinePass", "Run", "Score",
-    "Session", "Waveform", "WaveformEvaluation", "beyond_all_quantities",
+    "Seen", "Session", "Waveform", "WaveformEvaluation", "beyond_all_quantities",
 ]  # fmt: skip
 
 KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation, Diagnosis, Session)}

@@ -74,6 +74,28 @@ class Fit:
 
 
 @dataclass(frozen=True, slots=True)
+class Seen:
+    """What the records of a model held, and what the model misses of them."""
+
+    rms_percent: Annotated[float, percent("rms error of the model, of the output span")]
+    max_percent: Annotated[float, percent("largest error of the model, of the output span")]
+    input_low: Annotated[float, Data("@input_unit", "lowest input of the records")]
+    input_high: Annotated[float, Data("@input_unit", "highest input of the records")]
+    output_low: Annotated[float, Data("@output_unit", "lowest output of the records")]
+    output_high: Annotated[float, Data("@output_unit", "highest output of the records")]
+    input_unit: str = "A"
+    output_unit: str = "N"
+
+    @classmethod
+    def of(
+        cls, missed: tuple[float, float], inputs: FloatArray, outputs: FloatArray, units: tuple[str, str]
+    ) -> Seen:
+        """Return what inputs and outputs (n,) hold, beside the rms and the largest error, % of the span."""
+        low, high = float(np.nanmin(inputs)), float(np.nanmax(inputs))
+        return cls(*missed, low, high, float(np.nanmin(outputs)), float(np.nanmax(outputs)), *units)
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """One parameter of an extension, with its confidence interval."""
 
@@ -147,6 +169,7 @@ class Model(Shown):
     coil: Coil | None = None  # of the first run that has one
     edges_unit: str = ""  # of the input, of a dual model of the output: follows from the form
     offset_unit: str = ""  # of the output, of a dual model of the input: follows from the form
+    seen: Seen | None = None  # in all of its records
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:
@@ -172,6 +195,15 @@ class Model(Shown):
         said = (self.form, self.reading, self.polarity, self.extensions, self.input_unit, self.output_unit)
         parts = [np.append(one, self.offset).tobytes() for one in (self.edges, self.weights)]
         return hashlib.sha256(b"".join((*parts, repr(said).encode()))).hexdigest()
+
+    @property
+    def known(self) -> Seen | None:
+        """What its records held, and what it misses of them; of older files what the fit kept, or None."""
+        fit = self.fit
+        if self.seen or fit is None or not (np.isfinite(fit.input).any() and np.isfinite(fit.output).any()):
+            return self.seen
+        missed, units = (fit.rms_percent, fit.max_percent), (self.input_unit, self.output_unit)
+        return Seen.of(missed, fit.input, fit.output, units)
 
     @property
     def edges_quantity(self) -> str:

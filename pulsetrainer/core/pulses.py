@@ -23,6 +23,7 @@ class Shape:
     value: FloatArray  # (n,) any unit; 0..1 in the library
     source: str = ""
     feet_s: tuple[float, ...] = (0.0,)  # where its beats begin, from the first sample on
+    unit: str = ""  # of the values, where it is known
     note: str = ""  # what a person should know of where it was read from
 
     def __post_init__(self) -> None:

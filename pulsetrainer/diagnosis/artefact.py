@@ -16,6 +16,7 @@ from pulsetrainer.artefacts import (
     Parameter,
     Profile,
     Recorded,
+    Seen,
 )
 from pulsetrainer.artefacts.units import unit_of, with_unit
 from pulsetrainer.core.coverage import coverage, covers_range
@@ -51,9 +52,11 @@ def diagnosis_of(state: State) -> Diagnosis:
     percent = PERCENT / float(np.ptp(problem.measured))
     of_samples = scale.span * percent_of_samples(state)
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
-    in_use = float("nan")
-    if state.extended is not None:
-        in_use = rms_of(state, state.extended, undone(state)) / scale.span
+    in_use, in_use_model = float("nan"), state.extended
+    if in_use_model is not None:
+        errors = np.concatenate(errors_of(state, in_use_model, undone(state))) / scale.span
+        in_use = root_mean_square(errors)
+        in_use_model = replace(in_use_model, seen=_seen(state, model, of_samples * errors))
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     bench = advice_wording.Bench(
         scale,
@@ -90,7 +93,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         output=sign * scale.outputs(problem.measured)[thin],
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
         after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
-        extended=state.extended,
+        extended=in_use_model,
         extended_rms_percent=in_use * of_samples,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
@@ -161,6 +164,15 @@ def _words(given: Given) -> Words:
         "in_u": with_unit("", of_input),
         **{wording.recording(k, {}): name for k, name in enumerate(given.names)},
     }
+
+
+def _seen(state: State, model: Model, errors: FloatArray) -> Seen:
+    """Return what the records held, and how large ``errors`` (n,) of single samples are, of the span."""
+    records = state.question.records
+    inputs = np.concatenate([one.input[one.counts] for one in records])
+    outputs = model.polarity * np.concatenate([one.output[one.counts] for one in records])
+    missed = root_mean_square(errors), float(np.max(np.abs(errors)))
+    return Seen.of(missed, inputs, outputs, (model.input_unit, model.output_unit))
 
 
 def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, estimate: bool = False) -> float:

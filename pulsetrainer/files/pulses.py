@@ -72,4 +72,5 @@ def read_pulse(name: str) -> Shape:
             f"of the {len(columns.names)} columns of {path} the second is played, {columns.names[1]}; to "
             "play another one, write it into a table of its own, time and value"
         )
-    return Shape(path.stem, time_s, value, said.get("source") or path.name, feet_s, note)
+    source, unit = said.get("source") or path.name, columns.unit(columns.names[1])
+    return Shape(path.stem, time_s, value, source, feet_s, unit, note)

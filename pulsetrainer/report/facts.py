@@ -47,10 +47,14 @@ def span_words(values: FloatArray, unit: str) -> str:
     if values.size == 0:
         return "no samples"
     low, high = float(np.min(values)), float(np.max(values))
-    # a small swing about a large value needs more digits than four to be seen
-    share = (high - low) / max(abs(low), abs(high)) if high > low else 1.0
-    digits = min(4 + max(0, int(-np.log10(share))), 12)
+    digits = span_digits(low, high)
     return with_unit(f"{low:.{digits}g} .. {high:.{digits}g}", unit)
+
+
+def span_digits(low: float, high: float) -> int:
+    """Return how many digits tell the ends of a range apart: four, or more of a small swing about much."""
+    share = (high - low) / max(abs(low), abs(high)) if high > low else 1.0
+    return min(4 + max(0, int(-np.log10(share))), 12)
 
 
 def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:

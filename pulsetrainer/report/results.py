@@ -16,7 +16,7 @@ from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS, ModelEvalu
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.core.metrics import lacking
 from pulsetrainer.diagnosis.prediction import operator_of
-from pulsetrainer.report.facts import coil_words, loop_words, minor_words, run_facts, span_words
+from pulsetrainer.report.facts import coil_words, loop_words, minor_words, run_facts, span_digits, span_words
 from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
 from pulsetrainer.report.tables import text as shown
@@ -99,11 +99,11 @@ def drive_title(drive: Waveform) -> str:
     return f"{drive.name} by {drive.inversion} inversion"
 
 
-def _range_words(ends: tuple[float, float], unit: str) -> str:
-    """Return a range with three decimals; with other digits where these tell too much or too little."""
-    if ends[1] - ends[0] < _SMALL or max(map(abs, ends)) >= _LARGE:
-        return span_words(np.asarray(ends), unit)
-    return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit)
+def _range_words(ends: tuple[float, float], unit: str, peak: float = 0.0) -> tuple[str, str]:
+    """Return a range, and a ``peak`` beside it, with three decimals, or with the digits that tell enough."""
+    if ends[1] - ends[0] < _SMALL or max(map(abs, (*ends, peak))) >= _LARGE:
+        return span_words(np.asarray(ends), unit), with_unit(f"{peak:.{span_digits(*ends)}g}", unit)
+    return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit), with_unit(f"{peak:.3f}", unit)
 
 
 def inverted(out: Path, drive: Waveform) -> Said:
@@ -114,6 +114,8 @@ def inverted(out: Path, drive: Waveform) -> Said:
     given, made = (model.input_quantity, model.output_quantity) if model else ("current", "force")
     seconds = drive.time_s.size / drive.rate_Hz
     length = f"{seconds:.2f} s" if seconds >= 1 else with_seconds(seconds)
+    seen = model.known if model else None
+    rms, largest = (seen.rms_percent, seen.max_percent) if seen else (math.nan, math.nan)
     payload = {
         "output": out,
         **picked(drive, "name", "inversion"),
@@ -122,23 +124,33 @@ def inverted(out: Path, drive: Waveform) -> Said:
         "force_range": force,
         "current_range": current,
         **picked(drive, "clipped_samples", "predicted_max_error_percent", "predicted_peak"),
+        "fit_rms_percent": rms,
+        "fit_max_percent": largest,
         **picked(drive, "input_unit", "output_unit"),
     }
-    before = ""
-    if drive.predicted_peak > _MORE_BEFORE * drive.full_force:
-        peak = f"{drive.predicted_peak:.3f} {drive.output_unit}"
-        before = f"; up to {peak} in the strokes before the pulse, by the model"
+    more = drive.predicted_peak > _MORE_BEFORE * drive.full_force
+    made_words, peak = _range_words(force, drive.output_unit, drive.predicted_peak if more else 0.0)
+    before = f"; up to {peak} in the strokes before the pulse, by the model" if more else ""
     error = drive.predicted_max_error_percent
     most = f"at most {error:.3f}" if error >= _TOLD_PERCENT else f"under {_TOLD_PERCENT:g}"
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
-        made: _range_words(force, drive.output_unit) + before,
-        given: _range_words(current, drive.input_unit),
+        made: made_words + before,
+        given: _range_words(current, drive.input_unit)[0],
         "out of reach": counted(drive.clipped_samples, "sample"),
         "expected error": f"{most} % of full {made}, by the model{but}",
+        **_misses(rms, largest),
     }
     return payload, f"{out}: {drive_title(drive)}", rows
+
+
+def _misses(rms: float, largest: float) -> dict[str, str]:
+    """Say what a model missed of its own record, per cent of the span: a drive may miss as much."""
+    if not math.isfinite(rms):
+        return {}
+    most = f", {largest:.2f} % max" if math.isfinite(largest) else ""
+    return {"the model itself": f"missed its record by {rms:.3f} % rms{most}, of the span"}
 
 
 def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
+from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run, Seen
 from pulsetrainer.artefacts.units import (
     counted,
     in_units,
@@ -372,6 +372,8 @@ def _model(
     sigmas = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
     units = (first.output_unit, first.input_unit)
     above, below = units[::-1] if fitted.form == "dual" else units
+    max_percent = 100.0 * errors.max_abs / float(np.ptp(np.concatenate([r.output for r in runs])))
+    inputs = np.concatenate(fitted.counted([run.input for run in runs]))
     return Model(
         edges=inner.plane.edges,
         weights=inner.weights,
@@ -391,11 +393,12 @@ def _model(
         serial=_only(run.serial for run in runs),
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,
+        seen=Seen.of((errors.rms_percent, max_percent), inputs, measured, units[::-1]),
         fit=Fit(
             rms=errors.rms,
             max_abs=errors.max_abs,
             rms_percent=errors.rms_percent,
-            max_percent=100.0 * errors.max_abs / float(np.ptp(np.concatenate([r.output for r in runs]))),
+            max_percent=max_percent,
             coverage_percent=100.0 * float(np.mean(covered)),
             input_unit=first.input_unit,
             output_unit=first.output_unit,

@@ -8,7 +8,14 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
-from pulsetrainer.artefacts.units import counted, with_seconds, with_unit
+from pulsetrainer.artefacts.units import (
+    counted,
+    quantity_in_words,
+    same_units,
+    shown,
+    with_seconds,
+    with_unit,
+)
 from pulsetrainer.core import inversion
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
@@ -28,7 +35,9 @@ from pulsetrainer.steps.progress import Progress, silent
 Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
-_SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
+_SLIGHT = (
+    1.0  # % of full force, or of the recorded span: below what presses and sensors of such devices repeat
+)
 _LONG_S = 60.0  # of a period: no pulse of a heart
 _AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
 _SEAM = 0.02  # of the height of a pulse: a smaller jump from its end to its beginning is not told ...
@@ -117,7 +126,7 @@ def invert(
     rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
     _check_length(shape, model, periods)
-    _check_describes(model, name, despite_warning=despite_warning)
+    warnings = _check_describes(model, name, despite_warning=despite_warning)
     notes += fit_notes.of_guessed_turns(model) + fit_notes.of_noisy_ends(model)
     chosen = _method(method, model, name)
     part = invertible(model, own_Hz)
@@ -156,20 +165,22 @@ def invert(
         period_s=shape.period_s,
         notes=tuple(notes),
     )
+    notes += _beyond_the_record(drive, model)
     if drive.predicted_max_error_percent > EXPECTED:
         slowed = float(np.abs(current - exact).max())
-        return replace(drive, warnings=(_expected(drive, slowed, limit),))
-    return replace(drive, notes=(*notes, *_of_clipped(drive)))
+        return replace(drive, notes=tuple(notes), warnings=(*warnings, _expected(drive, slowed, limit)))
+    return replace(drive, notes=(*notes, *_of_clipped(drive)), warnings=warnings)
 
 
-def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
-    """Refuse a model whose fit says that its form does not describe the record."""
+def _check_describes(model: Model, name: str, *, despite_warning: bool) -> tuple[str, ...]:
+    """Refuse a model whose fit says that its form does not describe the record, or return that warning."""
     warning = model.fit.warning if model.fit else ""
-    if warning and not despite_warning:
-        raise DataError(
-            f"{name} does not describe the record it was identified on. {warning}",
-            hint="give `despite_warning` to invert it all the same",
-        )
+    if not warning:
+        return ()
+    said = f"{name} does not describe the record it was identified on. {warning}"
+    if not despite_warning:
+        raise DataError(said, hint="give `despite_warning` to invert it all the same")
+    return (said,)
 
 
 def _rate_for(shape: Shape, model: Model, notes: list[str]) -> float:
@@ -360,12 +371,50 @@ def _stretched(
 ) -> list[str]:
     """Say it where the values of a pulse are not those that are played; one from 0 to 1 is only a shape."""
     own = float(shape.value.min()), float(shape.value.max())
+    another = _of_another_unit(shape, model)
     as_it_is = np.allclose(own, forces, atol=1e-8 * (forces[1] - forces[0]))
     if None not in asked or np.allclose(own, (0.0, 1.0), atol=_NORMALISED) or as_it_is:
-        return []
+        return another
     ends = with_unit(f"{forces[0]:.4g} .. {forces[1]:.4g}", model.output_unit)
     said = f"the values of {shape.name} go from {own[0]:.4g} to {own[1]:.4g}; they are stretched to {ends}"
-    return [f"{said}: give `force_min` and `force_max` for other ends"]
+    return [*another, f"{said}: give `force_min` and `force_max` for other ends"]
+
+
+def _of_another_unit(shape: Shape, model: Model) -> list[str]:
+    """Say that a pulse is in another unit than the model's output; a pure number is in none."""
+    if shape.unit in ("", "1") or same_units((shape.unit,), (model.output_unit,)):
+        return []
+    made, unit = quantity_in_words(model.output_quantity), shown(model.output_unit)
+    said = f"{shape.name} is a pulse in {shown(shape.unit)}, and the {made} of the model is in {unit or '1'}"
+    return [f"{said}: only its shape is used"]
+
+
+def _beyond_the_record(drive: Waveform, model: Model) -> list[str]:
+    """Say where the model expects more of the output than was recorded, or nothing is known of the input."""
+    seen = model.known
+    given, made = quantity_in_words(model.input_quantity), quantity_in_words(model.output_quantity)
+    if seen is None:  # the ends of any other form are those of the record
+        taken = with_unit(_ends(drive.compensated), model.input_unit)
+        said = (
+            f"the {given} goes over {taken}, ends that follow from the weights: this model does not say what"
+        )
+        return [f"{said} was recorded"] if model.form == "dual" else []
+    least = 0.01 * _SLIGHT * (seen.output_high - seen.output_low)
+
+    def within(output: FloatArray) -> bool:
+        return bool(output.min() >= seen.output_low - least and output.max() <= seen.output_high + least)
+
+    if within(drive.predicted):
+        return []
+    foretold = with_unit(_ends(drive.predicted), model.output_unit)
+    recorded = with_unit(f"{seen.output_low:.4g} .. {seen.output_high:.4g}", model.output_unit)
+    where = " in the strokes before and after the pulse" if within(drive.predicted[drive.scored]) else ""
+    said = f"by the model the {made} goes over {foretold}{where}, and its record holds {recorded}"
+    return [f"{said}: what the device does beyond was never seen"]
+
+
+def _ends(values: FloatArray) -> str:
+    return f"{values.min():.4g} .. {values.max():.4g}"
 
 
 def _jumps(shape: Shape) -> list[str]:
@@ -400,7 +449,7 @@ def _tracked(
         layout.wanted,
         1.0 / layout.rate_Hz,
         lead=layout.lead,
-        inverse=part.inverse if model.form == "signed" else None,
+        inverse=None if model.form == "direct" else part.inverse,  # of others a range, and not all
         band_Hz=band_Hz,
     )
     left, static = (with_unit(f"{rms:.3g}", model.output_unit) for rms in (found.rms, found.rms_static))

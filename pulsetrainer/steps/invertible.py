@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -22,6 +22,7 @@ CONDITIONING_TIME_S = 0.5  # for each way of the major loop that comes first
 REST_S = 0.2
 # Times the rms error of the fit: a branch of a signed model that turns back less is monotone.
 _TURNS_BACK = 2.0
+_ROUNDING = 1e-9  # of the range of the input
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +75,19 @@ def invertible(model: Model, rate_Hz: float) -> Invertible:
 
 def _recorded(whole: Dual, model: Model, rate_Hz: float) -> Invertible:
     """Return a dual model within the inputs that it was fitted to: its own ends follow from the weights."""
-    seen = model.fit.input if model.fit is not None and model.fit.input.size else np.array([-np.inf, np.inf])
-    low, high = max(whole.low, float(np.min(seen))), min(whole.high, float(np.max(seen)))
+    low, high, seen = whole.low, whole.high, model.known
+    if seen is not None:
+        low, high = max(low, seen.input_low), min(high, seen.input_high)
     loop = major_loop(low, high, rate_Hz)
     outputs = whole(loop)
     below, above = sorted((float(outputs[np.argmax(loop)]), float(outputs[-1])))
-    inverse = partial(whole.inverse, lead=loop)
+
+    def inverse(target: FloatArray) -> inversion.Inverse:
+        found = whole.inverse(target, loop)
+        beyond = np.maximum(low - found.input, found.input - high) > _ROUNDING * (high - low)
+        clipped = max(found.clipped, int(np.sum(beyond)))  # a target out of reach is beyond both
+        return replace(found, input=np.clip(found.input, low, high), clipped=clipped)
+
     return Invertible(whole, low, high, (below, above), whole.polarity, loop, np.zeros(0), inverse)
 
 

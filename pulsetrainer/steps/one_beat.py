@@ -25,7 +25,7 @@ def shape_of(drive: Waveform) -> Shape:
         )
     first = int(np.flatnonzero(drive.scored)[0])
     one = slice(first, first + round(drive.period_s * drive.rate_Hz))
-    return Shape(drive.name, drive.time_s[one], drive.target[one], drive.source)
+    return Shape(drive.name, drive.time_s[one], drive.target[one], drive.source, unit=drive.output_unit)
 
 
 def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shape:

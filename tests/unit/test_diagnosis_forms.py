@@ -195,7 +195,13 @@ def test_a_falling_extended_model_is_inverted():
     run = pt.Run(time_s=np.arange(u.size) / RATE_HZ, input=u, output=y, input_unit="V", output_unit="mm")
     model = pt.identify(run, levels=24, form="direct")
     assert model.polarity == -1
-    drive = pt.invert("normal", pt.extend(model, pt.diagnose(run, model)))
+    found = pt.diagnose(run, model)
+    extended = pt.extend(model, found)
+    seen = extended.seen
+    assert (seen.input_low, seen.input_high) == (u.min(), u.max())
+    assert (seen.output_low, seen.output_high) == pytest.approx((y.min(), y.max()))
+    assert seen.rms_percent == found.extended_rms_percent < seen.max_percent
+    drive = pt.invert("normal", extended)
     error = (drive.predicted - drive.target)[drive.scored] / np.ptp(run.output)
     # a few samples at the end of the range are out of reach: they are counted, and are the largest errors
     assert 0 < drive.clipped_samples < 0.05 * drive.target.size

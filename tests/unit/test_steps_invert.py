@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import form_devices as devices
 import numpy as np
 import pytest
 
 import pulsetrainer as pt
-from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.artefacts import Extension, Parameter, Seen
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
+from pulsetrainer.report.results import inverted
 from wording import raises, tells
 
 ROWS = 1200
@@ -169,3 +171,90 @@ def test_a_pulse_that_does_not_lead_back_to_its_beginning_is_told(ends_off, said
     slope = ends_off * np.ptp(pulse.value) * np.arange(ROWS) / (ROWS - 1)
     notes = pt.invert(replace(pulse, value=pulse.value + slope), _model()).notes
     assert any("each period begins with a jump" in note for note in notes) is said
+
+
+def _damper(noise: float = 0.003) -> tuple[pt.Run, pt.Model]:
+    """Return a record of a device whose force leads its stretch, and its dual model."""
+    rng = np.random.default_rng(0)
+    device, u = devices.bouc_wen(rng), devices.record(rng, 3000)
+    y = device(u)
+    y = y + noise * np.ptp(y) * rng.normal(size=y.size)
+    run = pt.Run(time_s=np.arange(u.size) / 100, input=u, output=y, input_unit="mm", output_unit="N")
+    return run, pt.identify(run, levels=16, form="dual")
+
+
+def test_an_extended_dual_model_keeps_to_the_range_of_its_record():
+    """It has no fit, and the ends of its weights lie beyond what anybody has seen."""
+    run, model = _damper()
+    tau, share = (
+        Parameter(name, value, unit, value, value)
+        for name, value, unit in (("tau", 0.5, "s"), ("amplitude", 0.1, "1"))
+    )
+    extended = replace(model, fit=None, as_measured=True, extensions=(Extension("creep", (share, tau)),))
+    low, high = float(run.input.min()), float(run.input.max())
+    slack = 1e-9 * (high - low)
+    drive = pt.invert("normal", extended, despite_warning=True)
+    assert drive.inversion == "extended"
+    assert low - slack <= drive.compensated.min() < drive.compensated.max() <= high + slack
+    unknown = pt.invert("normal", replace(extended, seen=None))
+    assert unknown.compensated.max() > high + 0.01 * (high - low)
+    said, silent = (
+        sum("does not say what was recorded" in note for note in one.notes) for one in (unknown, drive)
+    )
+    assert (said, silent) == (1, 0)
+
+
+@pytest.mark.parametrize("most", [1.0, 0.9])
+def test_more_than_was_recorded_is_told(most):
+    """The strokes before the pulse go to the ends of the model, whatever was asked for."""
+    low, high = (float(end) for end in _model().predict([0.0, 1.5]))
+    seen = Seen(0.5, 2.0, 0.0, 1.5, low, low + most * (high - low))
+    model = replace(_model(), seen=seen)
+    drives = pt.invert("normal", model, force_min=low, force_max=low + 0.1), pt.invert("normal", model)
+    small, whole = ([note for note in drive.notes if "was never seen" in note] for drive in drives)
+    assert len(small) == len(whole) == (most < 1.0)
+    for note in small:
+        assert f"over {low:.4g} .. {high:.4g} N in the strokes before" in note
+        assert f"its record holds {low:.4g} .. {seen.output_high:.4g} N" in note
+    assert not any("strokes" in note for note in whole)
+
+
+def test_what_the_model_missed_stands_beside_the_expected_error():
+    """A drive that the model follows exactly is on the device as wrong as the model."""
+    run, model = _damper()
+    drive = pt.invert("normal", model, despite_warning=True)
+    payload, _, rows = inverted(Path("drive.h5"), drive)
+    assert (payload["fit_rms_percent"], payload["fit_max_percent"]) == (
+        model.fit.rms_percent,
+        model.fit.max_percent,
+    )
+    missed = f"{model.fit.rms_percent:.3f} % rms, {model.fit.max_percent:.2f} % max, of the span"
+    assert rows["the model itself"] == f"missed its record by {missed}"
+    assert drive.predicted_max_error_percent < 0.1 * model.fit.max_percent
+    assert (model.seen.input_low, model.seen.output_high) == (run.input.min(), run.output.max())
+    of_none = inverted(Path("drive.h5"), pt.invert("normal", _model()))
+    assert "the model itself" not in of_none[2]
+    assert np.isnan(of_none[0]["fit_rms_percent"])
+
+
+def test_the_warning_of_a_model_goes_on_into_its_drive():
+    """Whoever inverts it all the same is told again what he does."""
+    _, model = _damper()
+    warned = replace(model, fit=replace(model.fit, warning="It depends on the weather."))
+    drive = pt.invert("normal", warned, despite_warning=True, name="model.h5")
+    assert drive.warnings == (
+        "model.h5 does not describe the record it was identified on. It depends on the weather.",
+    )
+
+
+@pytest.mark.parametrize(("heading", "said"), [("strain_um", True), ("force_N", False), ("p", False)])
+@pytest.mark.parametrize("ends", [{}, {"force_min": 6.0, "force_max": 8.0}])
+def test_a_pulse_in_another_unit_is_only_a_shape(tmp_path, heading, said, ends):
+    """Also where the forces are given, since nobody compares them with the table then."""
+    table = tmp_path / "wish.csv"
+    rows = (f"{0.005 * k:.3f},{200 + 800 * np.sin(np.pi * k / 200) ** 2:.3f}" for k in range(200))
+    table.write_text("\n".join((f"t_s,{heading}", *rows)))
+    notes = " ".join(pt.invert(table, _model(), **ends).notes)
+    assert ("is a pulse in µm" in notes or "is a pulse in um" in notes) is said
+    assert ("only its shape is used" in notes) is said
+    assert ("stretched to" in notes) is not bool(ends)

@@ -51,6 +51,9 @@ def test_a_small_pulse_is_told_with_the_strokes_before_it():
         rows["force"]
         == f"2.000 .. 3.000 N; up to {largest:.3f} N in the strokes before the pulse, by the model"
     )
+    hundredfold = replace(drive, target=100.0 * drive.target, predicted=100.0 * drive.predicted)
+    words = inverted(Path("drive.h5"), hundredfold)[2]["force"]
+    assert words.startswith(f"200 .. 300 N; up to {100.0 * largest:.4g} N in the strokes")
     whole = pt.invert("normal", model)
     assert "before" not in inverted(Path("drive.h5"), whole)[2]["force"]
 
