@@ -152,7 +152,7 @@ MESSAGES = {
     "no beat of a session": Message("has no whole beat", "pulsetrainer session", "{file}"),
     "not such a row": Message("", "", "{file}, {row}", "expected {expected}", "{got}"),
     "too few answers": Message("answer", "one pulse name on each line", "{file}", "{expected}", "{got}"),
-    "of another device": Message("the run to verify with is of {run}", "the same device", got="of {model}"),
+    "of another device": Message("the run to verify with {run}", "the same device", got="{model}"),
     "a run that was diagnosed": Message("to verify with is one that", "not diagnosed", "{file}"),
     "nothing to extend by": Message("nothing to extend", "{next}", "{file}", got="{verdict}"),
     # --- words -------------------------------------------------------------------------------------------

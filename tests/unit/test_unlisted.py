@@ -262,9 +262,9 @@ def test_a_run_of_its_own_decides(dipping):
         pt.extend(model, found, verify=_run(u, _static(u)))
     with raises(DataError, "has no time"):
         pt.extend(model, found, verify=replace(_run(u, _dip(u)), time_s=None))
-    with raises(DataError, "of another device", run="V and um", model="A and N"):
+    with raises(DataError, "of another device", run="is in V and um", model="is in A and N"):
         pt.extend(model, found, verify=replace(_run(u, _dip(u)), input_unit="V", output_unit="um"))
-    with raises(DataError, "of another device", run="BENCH-3", model="BENCH-0"):
+    with raises(DataError, "of another device", run="is of BENCH-3", model="is of BENCH-0"):
         pt.extend(replace(model, serial="BENCH-0"), found, verify=replace(_run(u, _dip(u)), serial="BENCH-3"))
 
 
