@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.artefacts import (
     DriveError,
@@ -50,6 +51,8 @@ _AT_THE_END = 0.1  # of the model's range, for a record that begins there
 _SETTLED = 3.0  # time constants: then a twentieth is left of where a slow cause began
 _SOON = 0.005  # of the record: what has passed within such a time matters little
 _APART = 1.03  # times the error of the fit: so large a one asks for a reason
+_FOLLOWS = 1.0 / 3.0  # of the samples: fewer are no measure of the first stroke
+_WINDOW = 7  # samples of a median: three wild ones do not move it
 _TO_TAKE_OUT = (
     "To take that out: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o diagnosis.h5, then pulsetrainer "
     "correct RUN.h5 --diagnosis diagnosis.h5 -o corrected.h5; and evaluate corrected.h5"
@@ -198,6 +201,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         if one.start != "known":
             notes.append(f"{name} does not reach the ends of {title}; state before it: {one.start}")
+        notes += _of_first_stroke(name, run, one, model, parts)
         notes += _begun_elsewhere(name, run, title, model)
         misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
@@ -253,6 +257,32 @@ def _clipped_words(name: str, run: Run, found: Sequence[Firing]) -> list[str]:
     sit = counted(int(sum(one.figures["count"] for one in found)), "sample", "sits", "sit")
     output = quantity_in_words(run.output_quantity)
     return [f"{sit} at exactly {at} in {name}, where its {output} looks cut off, and count in its errors"]
+
+
+def _of_first_stroke(
+    name: str, run: Run, one: ModelEvaluation, model: Model, parts: Sequence[tuple[Run, BoolArray]]
+) -> list[str]:
+    """Say when a model's largest error is, if it is in the first stroke and what follows has far less."""
+    (part, kept), *others = parts
+    at = np.flatnonzero(kept)
+    at = at[:: max(1, at.size // TRACE_SAMPLES)]
+    early = at < second_stroke(part.input, *range_of(model, [part]))
+    if others or one.time_s is None or run.time_s is None or not early.any() or np.mean(~early) < _FOLLOWS:
+        return []
+    # a median, for a wild sample is none of the stroke's
+    error = np.abs(scipy.ndimage.median_filter(one.output - one.predicted, _WINDOW, mode="nearest"))
+    rest, worst = float(error[~early].max()), int(np.argmax(error))
+    if not early[worst] or error[worst] <= LIMITS.first_stroke_missed * rest:
+        return []
+    first, later = (100.0 * size / float(np.ptp(part.output[kept])) for size in (error[worst], rest))
+    when = with_seconds(float(one.time_s[worst] - run.time_s[0]))
+    return [
+        (
+            f"the largest errors of {one.name} are in the first stroke of {name}, {first:.2g} % of the span "
+            f"at {when} after its beginning, and at most {later:.2g} % later: the state before it may be "
+            "another than the model's"
+        )
+    ]
 
 
 def _begun_elsewhere(name: str, run: Run, title: str, model: Model) -> list[str]:

@@ -114,6 +114,22 @@ def test_wild_samples_that_a_diagnosis_finds_are_told_with_the_way_to_take_them_
     assert "correct RUN.h5 --diagnosis" in note
 
 
+@pytest.mark.parametrize(("at", "size", "told"), [(0, 0.2, True), (0, 0.02, False), (500, 0.2, False)])
+def test_the_largest_error_is_placed_where_the_first_stroke_has_it(at, size, told):
+    """It dies away too soon to leave the stroke out; of a later or a small one nothing is said."""
+    u = np.interp(np.arange(1000), [0, 500, 999], [0.0, 1.0, 0.0])
+    noise = 0.01 * np.random.default_rng(6).standard_normal(u.size)
+    since = np.arange(u.size) - at
+    run = _run(noise + size * np.where(since >= 0, np.exp(-np.maximum(since, 0) / 15.0), 0.0), u)
+    notes = evaluate(run, MODEL, names=["a"], model_names=["m"]).notes
+    assert len(notes) == told
+    if told:
+        assert "of m are in the first stroke of a" in notes[0]
+        assert "at 0 s after its beginning" in notes[0]
+    noise[60] += size
+    assert not any("first stroke of" in note for note in evaluate(_run(noise, u), MODEL).notes)
+
+
 def test_errors_of_a_playback_are_what_they_are_called():
     """Mean, largest and rms error, noise and spread of the repeats, lag of the current, width of the loop.
 
