@@ -229,6 +229,19 @@ def test_lost_samples_leave_a_gap():
         encode(figure, "png")
 
 
+def test_samples_taken_out_are_no_data_in_the_figure_of_a_run():
+    """What was filled in for them is a dotted line with a name; the loop has a gap there."""
+    plain = examples.run(1000)
+    run = replace(plain, masked=np.arange(plain.input.size) % 100 < 20)
+    _, below, loop = figures.run(run).axes
+    measured, filled = (np.asarray(line.get_ydata()) for line in below.lines)
+    np.testing.assert_array_equal(np.isnan(measured), run.masked)
+    np.testing.assert_array_equal(np.isnan(filled), ~run.masked)
+    np.testing.assert_array_equal(np.isnan(loop.lines[0].get_ydata()), run.masked)
+    assert [text.get_text() for text in below.get_legend().get_texts()] == ["taken out"]
+    assert figures.run(plain).axes[1].get_legend() is None
+
+
 def test_all_samples_lost():
     """A record of nothing but NaN is an empty figure, not an error."""
     nothing = np.full(100, np.nan)
