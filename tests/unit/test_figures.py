@@ -660,6 +660,9 @@ def test_the_axis_of_a_record_is_its_time_counted_from_the_first_sample_where_it
     assert "number" in words
     assert "since" in since
     assert "since" not in time
+    # half an hour from 23:35 on, and one that began ten minutes after the clock
+    assert panels.abscissa(84_900.0 + 1800.0 * np.asarray([0.0, 0.5, 1.0]), 3)[0].tolist() == [0, 900, 1800]
+    assert panels.abscissa(600.0 + 1800.0 * np.asarray([0.0, 0.5, 1.0]), 3)[1] == "time"
 
 
 def test_what_tuning_would_play_is_told_with_the_gains_of_each_step():
