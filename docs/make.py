@@ -190,6 +190,7 @@ WORDS = {
     "stopped_by_key": "where a key stopped the session, in words; empty if none did",
     "form": "direct, dual or signed",
     "learner": "who answered",
+    "left_out_rows": "rows of the imported table that lacked a number",
     "loop": "counterclockwise, clockwise, butterfly or none; of a falling output once it is turned to rise",
     "masked_samples": "wild samples, left out of the fit",
     "meaning": "the parameter in words",

@@ -263,6 +263,8 @@ NOTES = {
         "other reversals",
         "inputs like the recorded one",
     ),
+    "known from": ("cut the force off", "only from -7.", "a guess"),
+    "known up to": ("cut the force off", "only up to 7.", "a guess"),
     "no minor loops": ("minor loops", "a guess", "within the major one"),
     "seen before": ("was identified from", "a run that neither has seen"),
     "zeros differ": ("shifted against each other",),

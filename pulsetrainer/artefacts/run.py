@@ -64,6 +64,7 @@ class Run(Shown):
     masked: Annotated[BoolArray | None, Data("1", "sample is left out", "time")] = None
     corrected: tuple[str, ...] = ()  # causes that were taken out of it
     coil: Coil | None = None  # of a device that tells the duty
+    left_out_rows: int = 0  # of the table that it was imported from: they lacked a number
 
     def __post_init__(self) -> None:
         if not self.input_quantity:

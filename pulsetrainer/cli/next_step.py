@@ -99,7 +99,7 @@ HOLDS = {
 
 # what a hint calls a file that the command line may name: the parameter that does
 _PLACEHOLDERS = {
-    "RUN.h5": ("run", "runs"),
+    "RUN.h5": ("run", "runs", "inputs"),
     "DIAGNOSIS.h5": ("diagnosis",),
     "MODEL.h5": ("model",),
     "REFINED.h5": ("learnt",),
@@ -110,7 +110,7 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
     """Return a text with the files that a command was given in the place of RUN.h5 and the like."""
     for placeholder, names in _PLACEHOLDERS.items():
         given: Any = next((value for name in names if (value := parameters.get(name))), None)
-        if isinstance(given, list | tuple) and len(given) == 1:
+        if isinstance(given, list | tuple) and (len(given) == 1 or "model" in names):  # the first one
             given = given[0]
         if isinstance(given, str | Path):
             text = text.replace(placeholder, shlex.quote(str(given)))

@@ -117,6 +117,7 @@ def run_from_table(
         input_quantity=split_unit(table.heading(input))[0],
         output_quantity=split_unit(table.heading(output))[0],
         signal=table.path.name,
+        left_out_rows=whole.rows - table.rows,
     )
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
     notes = (*notes, *_times_asked_for(table, meanings), *_other_units(table, meanings), *_not_read(table))

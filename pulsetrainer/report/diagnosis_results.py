@@ -135,7 +135,8 @@ def corrected(out: Path, measured: Run, made: Run) -> Said:
     if of_input:
         rows["largest change, input"] = with_unit(f"{of_input:.3g}", made.input_unit)
     if change or not (unchanged or of_input or masked):
-        rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit)
+        beside = ", beside the samples left out" if masked else ""
+        rows["largest change"] = with_unit(f"{change:.3g}", made.output_unit) + beside
     filled = ", filled in between their neighbours" if masked else ""
     rows["samples left out"] = f"{masked} of {made.output.size}{filled}"
     return payload, f"{out}: corrected run", rows

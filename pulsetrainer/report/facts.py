@@ -75,6 +75,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
         f"output ({run.output_quantity})": span_words(run.output, run.output_unit),
         "reversals": reversals,
         **picked(run, "complete", "dropped_samples"),
+        **(picked(run, "left_out_rows") if run.left_out_rows else {}),
     }
 
 

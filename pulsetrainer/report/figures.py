@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Concatenate, ParamSpec
 
+import numpy as np
 from matplotlib.figure import Figure, FigureBase
 
 from pulsetrainer.artefacts import (
@@ -78,7 +79,11 @@ def run(record: Run) -> Figure:
     if record.reference is not None:
         panels.trace(above, x, record.reference, **TARGET, label="reference")
     panels.trace(above, x, record.input, **MEASURED, label="measured")
-    panels.trace(below, x, record.output, **MEASURED)
+    measured = np.where(record.counts, record.output, np.nan)  # what was filled in is no data
+    panels.trace(below, x, measured, **MEASURED)
+    if record.masked is not None and record.masked.any():
+        panels.trace(below, x, np.where(record.counts, np.nan, record.output), **GUIDE, label="taken out")
+        panels.headroom(below)
     input_label = label(record.input_quantity, record.input_unit)
     output_label = label(record.output_quantity, record.output_unit)
     above.set_ylabel(input_label)
@@ -90,7 +95,7 @@ def run(record: Run) -> Figure:
     below.set_ylabel(output_label)
     panels.name_abscissa(below, name)
     loop = right.subplots()
-    panels.orbit(loop, record.input, record.output, **FINE)
+    panels.orbit(loop, record.input, measured, **FINE)
     loop.set(xlabel=input_label, ylabel=output_label)
     directions(loop, record.input, record.output)
     title = f"{record.output_quantity} over {record.input_quantity}; arrows: direction"

@@ -43,6 +43,8 @@ NAMES: Final = {
     "second_half_percent": Named("rms of the second half, zeroed on the first", "% of span"),
     "fit_rms_percent": Named("rms error of the fit", "% of span"),
     "coverage_percent": Named("cells switched", "%"),
+    # of a run
+    "left_out_rows": Named("rows left out by import"),
     # of a session
     "nrmse": Named("rms error", "% of the target's range"),
     "error_jnd": Named("mean error", "just noticeable differences"),

@@ -45,7 +45,7 @@ _DENSITY_REACH = 2.0
 # letters of a title in a line, above a whole column and above a square; matplotlib's own wrapping reads
 # what stands between two dollars as a formula, whatever the settings say
 _TITLE, _SQUARE_TITLE = 48, 30
-_CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
+_CLOCK = 10.0  # lengths of the record that its first time is late: a date, or minutes since midnight
 SAMPLE_NUMBER = "sample number"
 _QUANTITIES = {
     "N": "force", "A": "current", "T": "flux density", "V": "voltage", "Pa": "pressure", "N*m": "torque",
@@ -55,7 +55,7 @@ _QUANTITIES = {
 def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:
     """Return the horizontal axis of a record, and what it is: time in s, or else the sample number.
 
-    Time stamps with a date are counted from the first one.
+    Time stamps with a date, or a time of day, are counted from the first one.
     """
     if time_s is None:
         return np.arange(n, dtype=np.float64), SAMPLE_NUMBER

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite, nan
 
 import numpy as np
 
@@ -23,6 +24,8 @@ MANY = 3.0  # ... where that is so many times the noise of single samples
 _UNCOUNTED = 1000.0  # times the noise: more is not counted
 # % of the cells, by minor loops: where fewer are, nothing tells whether loops are congruent
 TOLD_APART = 20.0
+_CLIPPED = "saturation"  # the cause that is taken out of an output that its recorder cut off
+_BEYOND = 0.01  # of the output's span: where a model goes less far beyond what is known, it does no harm
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 
@@ -61,6 +64,52 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
         return []
     wild = counted(count, "wild sample", "is", "are")
     return [f"{wild} left out of the fit ({100 * count / size:.2g} % of the record)"]
+
+
+def known_ends(fitted: Fitted, runs: Sequence[Run]) -> tuple[float, float]:
+    """Return how far an output is known that its recorder cut off; NaN at an end where that is all of it.
+
+    That is the case where nothing tells what the samples were that are left out, and the model goes on.
+    """
+    said = [
+        y[~run.counts] for run, y in zip(runs, fitted.predicted, strict=True) if _CLIPPED in run.corrected
+    ]
+    guessed, known = np.concatenate([*said, np.zeros(0)]), fitted.counted_output
+    low, high, slack = float(known.min()), float(known.max()), _BEYOND * float(np.ptp(known))
+    return (
+        low if guessed.min(initial=np.inf) < low - slack else nan,
+        high if guessed.max(initial=-np.inf) > high + slack else nan,
+    )
+
+
+def of_clipped(model: Model) -> list[str]:
+    """Say how far the output is known that a model was fitted to, where its recorder cut it off."""
+    if not (said := _known_words(model)):
+        return []
+    output = _named(model)[0]
+    return [f"the recorder cut the {output} off, which is known {said}: beyond that the model is a guess"]
+
+
+def of_unknown_target(model: Model, low: float, high: float) -> list[str]:
+    """Say that a target from ``low`` to ``high`` goes where the output of the model's record is not known."""
+    fit = model.fit
+    if fit is None or not (low < fit.known_from - fit.rms or high > fit.known_to + fit.rms):
+        return []
+    ends = with_unit(f"{low:.4g} .. {high:.4g}", model.output_unit)
+    known = f"the {_named(model)[0]} of the model's record is known {_known_words(model)}"
+    guess = "beyond that the drive is a guess, which the expected error does not count"
+    return [f"the target goes over {ends}, but {known}: {guess}"]
+
+
+def _known_words(model: Model) -> str:
+    fit = model.fit
+    ends = (nan, nan) if fit is None else (fit.known_from, fit.known_to)
+    told = [
+        f"{way} {with_unit(f'{end:.4g}', model.output_unit)}"
+        for way, end in zip(("from", "up to"), ends, strict=True)
+        if isfinite(end)
+    ]
+    return " ".join(["only", *told]) if told else ""
 
 
 def leaves_much(fitted: Fitted) -> bool:

@@ -171,8 +171,10 @@ def identify(
     elif few := little_words(float(np.mean(covered))):
         notes.append(few)
     progress(1.0)
-    first = wild_ones[0]
+    first, ends = wild_ones[0], fit_notes.known_ends(fitted, measured)
     said = {
+        "known_from": ends[0],
+        "known_to": ends[1],
         "notes": tuple(notes),
         "warning": warning,
         "minor_percent": minor_percent,
@@ -180,7 +182,13 @@ def identify(
         "wild_input": raw[0].input[first] if first.any() else None,
         "wild_output": raw[0].output[first] if first.any() else None,
     }
-    return _model(fitted, measured, covered, ensemble, cleaned, said)
+    model = _model(fitted, measured, covered, ensemble, cleaned, said)
+    return _noted(model, fit_notes.of_clipped(model))
+
+
+def _noted(model: Model, notes: Sequence[str]) -> Model:
+    assert model.fit is not None
+    return replace(model, fit=replace(model.fit, notes=(*model.fit.notes, *notes))) if notes else model
 
 
 def to_their_tips(runs: list[Run]) -> list[Run]:

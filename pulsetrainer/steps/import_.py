@@ -290,6 +290,7 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
         if all(part.masked is None for part in parts)
         else np.concatenate([~part.counts for part in parts]),
         signal=", ".join(part.signal for part in parts),
+        left_out_rows=sum(part.left_out_rows for part in parts),
     )
     return whole, notes
 

@@ -137,6 +137,7 @@ def invert(
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
     if beat is None:
         say_if_several(shape, notes)  # after what can be refused: to find beats loads filters
+    notes += fit_notes.of_unknown_target(model, *forces)
     notes += _stretched(shape, forces, (force_min, force_max), model) + _jumps(shape)
     progress(0.2)
     layout = laid_out(shape, part, forces, periods, rate_Hz, own_Hz)

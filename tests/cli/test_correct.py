@@ -49,7 +49,9 @@ def test_it_says_what_was_corrected_and_masks_the_rest(folder):
     assert done.json["corrected"] == ["outliers", "offset-drift"]
     assert done.json["masked_samples"] == 5
     said = pulsetrainer(folder, *words[:-1], "--overwrite")
-    assert "largest change    0.2 N" in said.out, said  # the drift's, not the wild samples' 3
+    assert "largest change    0.2 N, beside the samples left out" in said.out, (
+        said
+    )  # the drift's, not the wild samples' 3
     assert ", filled in between their neighbours" in said.out
     assert "a run that the model is tested on may have the same fault" in said.err
     corrected, clean = pt.load(folder / "corrected.h5"), pt.load(folder / "other.h5")

@@ -40,6 +40,8 @@ def test_rows_with_a_blank_cell_are_left_out_when_asked_and_counted(tmp_path):
     assert "3 of 300 rows" in done.err
     run = store.read(tmp_path / "a.h5", Run)
     np.testing.assert_array_equal(run.time_s, np.delete([row[0] for row in rows], [5, 6, 200]))
+    shown = pulsetrainer(tmp_path, "show", "a.h5").out.splitlines()
+    assert [line.split()[-1] for line in shown if "rows left out by import" in line] == ["3"]
     # where rows are counted to tell the time, none may go
     words = ("--rate", "1000", "--skip-bad-rows")
     assert pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, *words, "-o", "b.h5").code == 2
@@ -73,6 +75,10 @@ def test_text_and_rows_of_the_wrong_length_are_left_out_when_asked(tmp_path):
     assert where.removeprefix("6 of 300 rows lack a number: ") in done.err
     run = store.read(tmp_path / "a.h5", Run)
     np.testing.assert_array_equal(run.output, np.delete([row[2] for row in _rows()], list(bad)))
+    _with_bad_rows(tmp_path / "b.csv", {7: "1,ERR,1"})
+    done = pulsetrainer(tmp_path, "import", "a.csv", "b.csv", *COLUMNS, "--skip-bad-rows", "-o", "ab.h5")
+    assert done.code == 0, done
+    assert store.read(tmp_path / "ab.h5", Run).left_out_rows == len(bad) + 1
 
 
 def test_a_table_of_bad_rows_is_refused_with_the_option_too(tmp_path):

@@ -229,6 +229,19 @@ def test_lost_samples_leave_a_gap():
         encode(figure, "png")
 
 
+def test_samples_taken_out_are_no_data_in_the_figure_of_a_run():
+    """What was filled in for them is a dotted line with a name; the loop has a gap there."""
+    plain = examples.run(1000)
+    run = replace(plain, masked=np.arange(plain.input.size) % 100 < 20)
+    _, below, loop = figures.run(run).axes
+    measured, filled = (np.asarray(line.get_ydata()) for line in below.lines)
+    np.testing.assert_array_equal(np.isnan(measured), run.masked)
+    np.testing.assert_array_equal(np.isnan(filled), ~run.masked)
+    np.testing.assert_array_equal(np.isnan(loop.lines[0].get_ydata()), run.masked)
+    assert [text.get_text() for text in below.get_legend().get_texts()] == ["taken out"]
+    assert figures.run(plain).axes[1].get_legend() is None
+
+
 def test_all_samples_lost():
     """A record of nothing but NaN is an empty figure, not an error."""
     nothing = np.full(100, np.nan)
@@ -647,6 +660,9 @@ def test_the_axis_of_a_record_is_its_time_counted_from_the_first_sample_where_it
     assert "number" in words
     assert "since" in since
     assert "since" not in time
+    # half an hour from 23:35 on, and one that began ten minutes after the clock
+    assert panels.abscissa(84_900.0 + 1800.0 * np.asarray([0.0, 0.5, 1.0]), 3)[0].tolist() == [0, 900, 1800]
+    assert panels.abscissa(600.0 + 1800.0 * np.asarray([0.0, 0.5, 1.0]), 3)[1] == "time"
 
 
 def test_what_tuning_would_play_is_told_with_the_gains_of_each_step():

@@ -21,7 +21,7 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import base, library
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.correct import _instead as instead
-from wording import raises
+from wording import raises, tells
 
 RATE_HZ = 200.0
 SPAN = 10.0
@@ -216,6 +216,29 @@ def test_an_output_cut_off_at_both_ends(clean, few_levels):
     models = [pt.identify(one, levels=24, form="direct") for one in (cut, done, known)]
     before, after, least = (one.rms for one in pt.evaluate(seen, models).models)
     assert before - after > 0.9 * (before - least)
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_a_model_says_how_far_an_output_is_known_that_was_cut_off(clean, polarity):
+    """It claims more, which is a guess; so is a drive that is to go there, and no other."""
+    rail = 0.75 * SPAN
+    hidden = clean.output >= rail
+    cut = replace(
+        clean, output=polarity * np.minimum(clean.output, rail), masked=hidden, corrected=("saturation",)
+    )
+    model = pt.identify(cut, levels=24, form="direct")
+    fit, last = model.fit, polarity * float(clean.output[~hidden].max())
+    assert (fit.known_to if polarity > 0 else fit.known_from) == pytest.approx(last, abs=0.01 * SPAN)
+    assert np.isnan(fit.known_from if polarity > 0 else fit.known_to)
+    tells(fit.notes[-1], "known up to" if polarity > 0 else "known from")
+    for beyond in (-0.05 * SPAN, 0.05 * SPAN):
+        ends = sorted((polarity * 0.2 * SPAN, last + beyond * polarity))
+        drive = pt.invert("normal", model, force_min=ends[0], force_max=ends[1], periods=1)
+        assert any("the target goes" in note for note in drive.notes) == (beyond > 0)
+    for whole in (replace(cut, corrected=()), replace(clean, corrected=("saturation",))):
+        fit = pt.identify(whole, levels=24, form="direct").fit
+        assert np.isnan([fit.known_from, fit.known_to]).all()
+        assert not any("cut" in note for note in fit.notes)
 
 
 def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(clean, few_levels):

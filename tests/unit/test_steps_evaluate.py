@@ -13,6 +13,7 @@ from core_jobs import curves
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Playback, Run
+from pulsetrainer.cli.next_step import with_files
 from pulsetrainer.core.initial_state import left_out_words
 from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -87,6 +88,46 @@ def test_wild_samples_of_a_run_are_told(at, said):
     error[at] += 0.5 * np.ptp(_run().output)
     notes = evaluate(_run(error), MODEL, names=["a"]).notes
     assert notes == tuple(f"{one} wild in a, and count in its errors" for one in said)
+
+
+def test_clipped_samples_of_a_run_are_told_with_the_way_to_take_them_out():
+    """A model is not to blame where the output is cut off; what was taken out is not told again."""
+    run = _run(0.01 * np.random.default_rng(4).standard_normal(U.size))
+    rail = float(np.quantile(run.output, 0.9))
+    clipped = replace(run, output=np.minimum(run.output, rail))
+    (note,) = evaluate(clipped, MODEL, names=["a"]).notes
+    count, _, rest = note.partition(" samples sit at exactly ")
+    assert int(count) == pytest.approx(100, abs=3)
+    assert rest.startswith(f"{rail:.4g} N in a, ")
+    named = with_files(note, {"inputs": [Path("a.h5")], "model": [Path("m.h5"), Path("n.h5")]})
+    assert "diagnose a.h5 --model m.h5 -o" in named
+    assert "correct a.h5 --diagnosis" in named
+    assert evaluate(replace(clipped, corrected=("saturation",)), MODEL).notes == ()
+
+
+def test_wild_samples_that_a_diagnosis_finds_are_told_with_the_way_to_take_them_out():
+    """Of one or two it finds none: see above."""
+    error = 0.01 * np.random.default_rng(4).standard_normal(U.size)
+    error[100:900:50] += 0.5 * np.ptp(_run().output)
+    (note,) = evaluate(_run(error), MODEL, names=["a"]).notes
+    assert note.startswith("16 samples look wild in a, and count in its errors. ")
+    assert "correct RUN.h5 --diagnosis" in note
+
+
+@pytest.mark.parametrize(("at", "size", "told"), [(0, 0.2, True), (0, 0.02, False), (500, 0.2, False)])
+def test_the_largest_error_is_placed_where_the_first_stroke_has_it(at, size, told):
+    """It dies away too soon to leave the stroke out; of a later or a small one nothing is said."""
+    u = np.interp(np.arange(1000), [0, 500, 999], [0.0, 1.0, 0.0])
+    noise = 0.01 * np.random.default_rng(6).standard_normal(u.size)
+    since = np.arange(u.size) - at
+    run = _run(noise + size * np.where(since >= 0, np.exp(-np.maximum(since, 0) / 15.0), 0.0), u)
+    notes = evaluate(run, MODEL, names=["a"], model_names=["m"]).notes
+    assert len(notes) == told
+    if told:
+        assert "of m are in the first stroke of a" in notes[0]
+        assert "at 0 s after its beginning" in notes[0]
+    noise[60] += size
+    assert not any("first stroke of" in note for note in evaluate(_run(noise, u), MODEL).notes)
 
 
 def test_errors_of_a_playback_are_what_they_are_called():
