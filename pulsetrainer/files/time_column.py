@@ -83,7 +83,8 @@ def time_of(
         notes = (*notes, f"the time of {table.path} {again}")
     time_s = seconds(table, time, of_record=True)
     step = steps_of(time_s).median if time_s.size > 1 else np.nan
-    if not unit and step >= _SLOW_S and time_s.size >= _MANY:
+    dated = is_since_1970(float(stamps[0]), unit)  # in ms it would be another year
+    if not unit and not dated and step >= _SLOW_S and time_s.size >= _MANY:
         said = f"the samples of {table.path} are {step:g} s apart if its time is in seconds, as assumed"
         notes = (*notes, f"{said} (if it is in ms, write the heading as '{name} [ms]')")
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:

@@ -201,7 +201,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         if one.start != "known":
             notes.append(f"{name} does not reach the ends of {title}; state before it: {one.start}")
-        notes += _of_first_stroke(name, run, one, model, parts)
+        notes += [] if _is_fitted_to(model, run) else _of_first_stroke(name, run, one, model, parts)
         notes += _begun_elsewhere(name, run, title, model)
         misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
