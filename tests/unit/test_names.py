@@ -196,8 +196,8 @@ def test_what_a_warm_coil_lacks_at_the_top_is_told(force, said):
 
 def test_a_range_has_three_decimals_or_as_many_as_tell_its_ends_apart():
     """Narrower than a tenth it would read as one number."""
-    assert results._range_words((1.0, 1.11), "A") == "1.000 .. 1.110 A"
-    assert results._range_words((1.0, 1.0004), "A") == "1 .. 1.0004 A"
+    assert results._range_words((1.0, 1.11), "A", 1.2) == ("1.000 .. 1.110 A", "1.200 A")
+    assert results._range_words((1.0, 1.0004), "A", 1.00052) == ("1 .. 1.0004 A", "1.00052 A")
 
 
 def test_a_list_is_aligned_by_the_longest_of_its_headings():

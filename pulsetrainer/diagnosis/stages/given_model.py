@@ -148,14 +148,15 @@ def _is_one_stroke(u: FloatArray) -> bool:
 
 def _carried(state: State, judged: Judged) -> tuple[State, list[Evidence]]:
     """Say what is known of the model as given where no other condition shows."""
+    said = _not_carried(state, judged)
+    if said and not is_its_own(state):
+        gain, offset = condition_change.carried(judged.measured, judged.predicted)
+        left = root_mean_square(judged.measured - gain * judged.predicted - offset)
+        if drifted := _drifted(state, judged, left):
+            return drifted
     if state.verdict in _NOTHING and _misfits(state, judged):
         return replace(state, verdict="unknown"), []
-    said = _not_carried(state, judged)
-    if not said or is_its_own(state):
-        return state, said
-    gain, offset = condition_change.carried(judged.measured, judged.predicted)
-    left = root_mean_square(judged.measured - gain * judged.predicted - offset)
-    return _drifted(state, judged, left) or (state, said)
+    return state, said
 
 
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
