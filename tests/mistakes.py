@@ -144,7 +144,9 @@ def at_once() -> dict[str, Mistake]:
     for name, (typed, where, then) in _WORDS_IN_QUOTES.items():
         found[name] = Mistake(typed, 2, where, then)
     nowhere = ("play", "drive.h5", "-o", "out.h5", "--port", "")
-    found["a port that a script left empty"] = Mistake(nowhere, 2, "--port must name a port", "leave it out")
+    found["a port that a script left empty"] = Mistake(
+        nowhere, 2, "--port must name a port", "its variable is set"
+    )
     return found
 
 
@@ -176,7 +178,11 @@ _WORDS_IN_QUOTES = {
         *(("identify", "run.h5", "-o", "~/out.h5"), "the folder ~ does not exist", "without quotes"),
     ),
     "a port of blanks": (
-        *(("play", "drive.h5", "-o", "out.h5", "--port", " "), "--port must name a port", "leave it out"),
+        *(
+            ("play", "drive.h5", "-o", "out.h5", "--port", " "),
+            "--port must name a port",
+            "its variable is set",
+        ),
     ),
     "a pulse that a script left empty": (
         *(("invert", "", "--model", "model.h5", "-o", "out.h5"), "there is no pulse ''", "name one of them"),
@@ -195,7 +201,7 @@ _WORDS_IN_QUOTES = {
         *(("tune", "-o", "tuned.yaml"), "tuned.yaml ends in '.yaml'", "name it tuned.toml"),
     ),
     "a blank behind an output": (
-        *(("identify", "run.h5", "-o", "out.h5 "), "'out.h5 ' has a blank at an end", "name it 'out.h5'"),
+        *(("identify", "run.h5", "-o", "out.h5 "), "'out.h5 ' has a space at an end", "name it 'out.h5'"),
     ),
     "a whole line in quotes": (
         *(("show run.h5",), "there is no command 'show run.h5'", "the quotes: pulsetrainer show run.h5"),
@@ -290,7 +296,7 @@ _WORDS_OF_A_TIRED_HAND = {
             "invert normal --model model.h5 -o out.h5 --force-max 90%",
             2,
             "got '90%'",
-            "give it without %: --force-max is the force at the top of the pulse, N or",
+            "give the value itself, not a share of it: --force-max is the force at the top of the pulse",
         ),
     ),
     "a choice without its word": (

@@ -208,7 +208,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         instead = instead.replace("{path}", shlex.quote(str(error.path)))
         error.hint = f"there is no {in_words(kinds)} file {where}; {instead}"
     else:
-        error.hint = f"there are no files that pulsetrainer wrote {where}: give the full path of one"
+        error.hint = f"there is no pulsetrainer file {where}: give the full path of one"
 
 
 def _for_a_pulse(path: Path, name: str, context: typer.Context) -> str:

@@ -98,7 +98,8 @@ def _as_a_number(parameter: Any, must: str) -> str:
         factor = _SECONDS[unit] / _SECONDS[said[1]]
         return f"write it in {said[1]}, without the unit: {float(number) * factor:g}"
     # what is typed in % must not be taken for N
-    return f"give it without {unit}: {named(parameter)} is the {meaning_of(parameter)}"
+    how = "give the value itself, not a share of it" if unit == "%" else f"give it without {unit}"
+    return f"{how}: {named(parameter)} is the {meaning_of(parameter)}"
 
 
 def _choice(parameter: Any, must: str, context: Any) -> str:
@@ -117,6 +118,9 @@ def _without(parameter: Any, help_: str) -> str:
     default = getattr(parameter, "default", None)
     if named(parameter) == "--delay":  # 0 takes out nothing
         return "give how late the output was recorded, in s, such as --delay 0.001"
+    if named(parameter) == "--port":  # left out, it would be the simulated device
+        lists = "pulsetrainer ports lists them"
+        return f"give its name ({lists}); if a script gives it, check that its variable is set"
     if isinstance(default, int | float) and not isinstance(default, bool):
         return f"leave it out for the usual {default:g}, or see {help_}"
     return help_ if getattr(parameter, "required", False) else f"leave it out, or see {help_}"

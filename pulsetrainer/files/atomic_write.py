@@ -29,7 +29,7 @@ def check_output(path: Path | str, overwrite: bool = False) -> None:
     if path.name != path.name.strip():
         whole = path.with_name(path.name.strip() or "out.h5")
         raise UsageError(
-            f"the output {str(path)!r} has a blank at an end of its name", hint=f"name it {str(whole)!r}"
+            f"the output {str(path)!r} has a space at an end of its name", hint=f"name it {str(whole)!r}"
         )
     try:
         folder = path.resolve().parent if path.is_symlink() else path.parent
