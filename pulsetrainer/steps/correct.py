@@ -197,5 +197,5 @@ def _instead(diagnosis: Diagnosis) -> str:
         return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o full.h5"
     in_doubt = any(one.confounded_with or one.doubts for one in diagnosis.found)
     if in_doubt or diagnosis.verdict in ("unknown", "inconclusive"):
-        return "follow the advice of the diagnosis: pulsetrainer show DIAGNOSIS.h5"
+        return f"follow the advice of the diagnosis: {diagnosis.advice[0]}"
     return "use the run as it is"

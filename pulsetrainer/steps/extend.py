@@ -107,7 +107,7 @@ def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
     elif diagnosis.verdict in ("none", *diagnosis.in_model) or not diagnosis.next_experiment:
         hint = "use the model as it is"
     else:
-        hint = "follow the advice of the diagnosis: pulsetrainer show DIAGNOSIS.h5"
+        hint = f"follow the advice of the diagnosis: {diagnosis.advice[0]}"
     return DataError(f"{name} {why}: there is nothing to extend the model by", hint=hint)
 
 
