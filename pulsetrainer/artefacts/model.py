@@ -64,9 +64,6 @@ class Fit:
     # "counterclockwise" | "clockwise" | "butterfly" | "none", of a falling output once it is turned to rise;
     loop: str = ""  # empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
-    # of a recorder that cut the output off: what lies beyond was never measured; NaN: nothing does
-    known_from: Annotated[float, Data("@output_unit", "least output that is known")] = nan
-    known_to: Annotated[float, Data("@output_unit", "largest output that is known")] = nan
 
     @property
     def output_uncertainty(self) -> float | None:

@@ -52,11 +52,11 @@ def diagnosis_of(state: State) -> Diagnosis:
     percent = PERCENT / float(np.ptp(problem.measured))
     of_samples = scale.span * percent_of_samples(state)
     rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
-    in_use, in_use_model = float("nan"), state.extended
-    if in_use_model is not None:
-        errors = np.concatenate(errors_of(state, in_use_model, undone(state))) / scale.span
+    in_use, extended_model = float("nan"), state.extended
+    if extended_model is not None:
+        errors = np.concatenate(errors_of(state, extended_model, undone(state))) / scale.span
         in_use = root_mean_square(errors)
-        in_use_model = replace(in_use_model, seen=_seen(state, model, of_samples * errors))
+        extended_model = replace(extended_model, seen=_seen(state, model, of_samples * errors))
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     bench = advice_wording.Bench(
         scale,
@@ -93,7 +93,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         output=sign * scale.outputs(problem.measured)[thin],
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
         after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
-        extended=in_use_model,
+        extended=extended_model,
         extended_rms_percent=in_use * of_samples,
         input_unit=model.input_unit,
         output_unit=model.output_unit,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite, nan
 
 import numpy as np
 
@@ -66,50 +65,23 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
     return [f"{wild} left out of the fit ({100 * count / size:.2g} % of the record)"]
 
 
-def known_ends(fitted: Fitted, runs: Sequence[Run]) -> tuple[float, float]:
-    """Return how far an output is known that its recorder cut off; NaN at an end where that is all of it.
+def of_clipped(fitted: Fitted, runs: Sequence[Run]) -> list[str]:
+    """Say how far an output is known that its recorder cut off, where the model goes on beyond.
 
-    That is the case where nothing tells what the samples were that are left out, and the model goes on.
+    Nothing tells there what the samples were that are left out.
     """
     said = [
         y[~run.counts] for run, y in zip(runs, fitted.predicted, strict=True) if _CLIPPED in run.corrected
     ]
     guessed, known = np.concatenate([*said, np.zeros(0)]), fitted.counted_output
     low, high, slack = float(known.min()), float(known.max()), _BEYOND * float(np.ptp(known))
-    return (
-        low if guessed.min(initial=np.inf) < low - slack else nan,
-        high if guessed.max(initial=-np.inf) > high + slack else nan,
-    )
-
-
-def of_clipped(model: Model) -> list[str]:
-    """Say how far the output is known that a model was fitted to, where its recorder cut it off."""
-    if not (said := _known_words(model)):
+    ends = [("from", low)] if guessed.min(initial=np.inf) < low - slack else []
+    ends += [("up to", high)] if guessed.max(initial=-np.inf) > high + slack else []
+    if not ends:
         return []
-    output = _named(model)[0]
-    return [f"the recorder cut the {output} off, which is known {said}: beyond that the model is a guess"]
-
-
-def of_unknown_target(model: Model, low: float, high: float) -> list[str]:
-    """Say that a target from ``low`` to ``high`` goes where the output of the model's record is not known."""
-    fit = model.fit
-    if fit is None or not (low < fit.known_from - fit.rms or high > fit.known_to + fit.rms):
-        return []
-    ends = with_unit(f"{low:.4g} .. {high:.4g}", model.output_unit)
-    known = f"the {_named(model)[0]} of the model's record is known {_known_words(model)}"
-    guess = "beyond that the drive is a guess, which the expected error does not count"
-    return [f"the target goes over {ends}, but {known}: {guess}"]
-
-
-def _known_words(model: Model) -> str:
-    fit = model.fit
-    ends = (nan, nan) if fit is None else (fit.known_from, fit.known_to)
-    told = [
-        f"{way} {with_unit(f'{end:.4g}', model.output_unit)}"
-        for way, end in zip(("from", "up to"), ends, strict=True)
-        if isfinite(end)
-    ]
-    return " ".join(["only", *told]) if told else ""
+    told = " ".join(f"{way} {with_unit(f'{end:.4g}', runs[0].output_unit)}" for way, end in ends)
+    cut_off = f"the recorder cut the {_named(runs[0])[0]} off, which is known only {told}"
+    return [f"{cut_off}: beyond that the model is a guess"]
 
 
 def leaves_much(fitted: Fitted) -> bool:

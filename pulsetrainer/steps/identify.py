@@ -171,10 +171,9 @@ def identify(
     elif few := little_words(float(np.mean(covered))):
         notes.append(few)
     progress(1.0)
-    first, ends = wild_ones[0], fit_notes.known_ends(fitted, measured)
+    notes += fit_notes.of_clipped(fitted, measured)
+    first = wild_ones[0]
     said = {
-        "known_from": ends[0],
-        "known_to": ends[1],
         "notes": tuple(notes),
         "warning": warning,
         "minor_percent": minor_percent,
@@ -182,13 +181,7 @@ def identify(
         "wild_input": raw[0].input[first] if first.any() else None,
         "wild_output": raw[0].output[first] if first.any() else None,
     }
-    model = _model(fitted, measured, covered, ensemble, cleaned, said)
-    return _noted(model, fit_notes.of_clipped(model))
-
-
-def _noted(model: Model, notes: Sequence[str]) -> Model:
-    assert model.fit is not None
-    return replace(model, fit=replace(model.fit, notes=(*model.fit.notes, *notes))) if notes else model
+    return _model(fitted, measured, covered, ensemble, cleaned, said)
 
 
 def to_their_tips(runs: list[Run]) -> list[Run]:

@@ -10,9 +10,6 @@ import numpy as np
 from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.artefacts.units import (
     counted,
-    quantity_in_words,
-    same_units,
-    shown,
     with_seconds,
     with_unit,
 )
@@ -24,7 +21,7 @@ from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.limits import ON_TIME_S
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
-from pulsetrainer.steps import fit_notes
+from pulsetrainer.steps import drive_notes, fit_notes
 from pulsetrainer.steps.arguments import check_force_range
 from pulsetrainer.steps.drive_layout import Layout, laid_out
 from pulsetrainer.steps.invertible import Invertible, invertible
@@ -35,15 +32,9 @@ from pulsetrainer.steps.progress import Progress, silent
 Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
-_SLIGHT = (
-    1.0  # % of full force, or of the recorded span: below what presses and sensors of such devices repeat
-)
 _LONG_S = 60.0  # of a period: no pulse of a heart
 _AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
-_SEAM = 0.02  # of the height of a pulse: a smaller jump from its end to its beginning is not told ...
-_SEAM_STEPS = 3.0  # ... nor one of fewer of its own largest steps
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
-_NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
 FEWEST = 20  # samples of a period: with fewer a drive does not follow the pulse
 _FEW, _MANY = 50, 100_000  # samples of a period: outside, the drive of any other device has its own rate
@@ -137,8 +128,8 @@ def invert(
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
     if beat is None:
         say_if_several(shape, notes)  # after what can be refused: to find beats loads filters
-    notes += fit_notes.of_unknown_target(model, *forces)
-    notes += _stretched(shape, forces, (force_min, force_max), model) + _jumps(shape)
+    notes += drive_notes.of_stretched(shape, forces, (force_min, force_max), model)
+    notes += drive_notes.of_jumps(shape)
     progress(0.2)
     layout = laid_out(shape, part, forces, periods, rate_Hz, own_Hz)
     if chosen == "extended":
@@ -166,11 +157,11 @@ def invert(
         period_s=shape.period_s,
         notes=tuple(notes),
     )
-    notes += _beyond_the_record(drive, model)
+    notes += drive_notes.of_more_than_recorded(drive, model)
     if drive.predicted_max_error_percent > EXPECTED:
-        slowed = float(np.abs(current - exact).max())
-        return replace(drive, notes=tuple(notes), warnings=(*warnings, _expected(drive, slowed, limit)))
-    return replace(drive, notes=(*notes, *_of_clipped(drive)), warnings=warnings)
+        warning = drive_notes.expected(drive, float(np.abs(current - exact).max()), limit)
+        return replace(drive, notes=tuple(notes), warnings=(*warnings, warning))
+    return replace(drive, notes=(*notes, *drive_notes.of_clipped(drive)), warnings=warnings)
 
 
 def _check_describes(model: Model, name: str, *, despite_warning: bool) -> tuple[str, ...]:
@@ -236,43 +227,6 @@ def slew_limit(asked: float | None, model: Model) -> float | None:
         return asked
     ours = model.input_unit == "A" and model.captured
     return DEVICE_SLEW_A_PER_S if ours else None
-
-
-def _expected(drive: Waveform, slowed: float, limit: float | None) -> str:
-    """Say how large an error the model itself expects of a drive, and why."""
-    if limit is not None and slowed > 0:
-        unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
-        why = f"the drive may move at most {unit}, which this pulse exceeds"
-    elif drive.clipped_samples:
-        why = (
-            "parts of the pulse are out of the model's reach: try a smaller pulse (`force_min`, `force_max`) "
-            "or a slower one"
-        )
-    elif drive.inversion == "closest-match":
-        why = "the drive moves in steps of the levels"
-    else:
-        why = "the model's output does not follow the pulse even without a limit"
-    error = f"{drive.predicted_max_error_percent:.1f} % of {_full(drive)}"
-    return f"the model itself expects errors of up to {error}: {why}"
-
-
-def _full(drive: Waveform) -> str:
-    return f"full {drive.model.output_quantity if drive.model else 'force'}"
-
-
-def _of_clipped(drive: Waveform) -> list[str]:
-    """Say what it costs that the drive stays at an end of its range; nothing where it never has to."""
-    if not drive.clipped_samples:
-        return []
-    left = counted(drive.clipped_samples, "sample")
-    error = f"{drive.predicted_max_error_percent:.2g} % of {_full(drive)}"
-    found = f"for {left} the drive would have to leave the model's range, and stays at its end"
-    matters = (
-        f"this does not matter, the model expects errors of at most {error}"
-        if drive.predicted_max_error_percent <= _SLIGHT
-        else f"the model expects errors of up to {error}; a smaller pulse (`force_min`, `force_max`) has less"
-    )
-    return [f"{found}: {matters}"]
 
 
 def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
@@ -365,67 +319,6 @@ def _within_beats(
             hint=f"give `force_min` and `force_max`, {other}, or the model without extensions",
         )
     return within
-
-
-def _stretched(
-    shape: Shape, forces: tuple[float, float], asked: tuple[float | None, float | None], model: Model
-) -> list[str]:
-    """Say it where the values of a pulse are not those that are played; one from 0 to 1 is only a shape."""
-    own = float(shape.value.min()), float(shape.value.max())
-    another = _of_another_unit(shape, model)
-    as_it_is = np.allclose(own, forces, atol=1e-8 * (forces[1] - forces[0]))
-    if None not in asked or np.allclose(own, (0.0, 1.0), atol=_NORMALISED) or as_it_is:
-        return another
-    ends = with_unit(f"{forces[0]:.4g} .. {forces[1]:.4g}", model.output_unit)
-    said = f"the values of {shape.name} go from {own[0]:.4g} to {own[1]:.4g}; they are stretched to {ends}"
-    return [*another, f"{said}: give `force_min` and `force_max` for other ends"]
-
-
-def _of_another_unit(shape: Shape, model: Model) -> list[str]:
-    """Say that a pulse is in another unit than the model's output; a pure number is in none."""
-    if shape.unit in ("", "1") or same_units((shape.unit,), (model.output_unit,)):
-        return []
-    made, unit = quantity_in_words(model.output_quantity), shown(model.output_unit)
-    said = f"{shape.name} is a pulse in {shown(shape.unit)}, and the {made} of the model is in {unit or '1'}"
-    return [f"{said}: only its shape is used"]
-
-
-def _beyond_the_record(drive: Waveform, model: Model) -> list[str]:
-    """Say where the model expects more of the output than was recorded, or nothing is known of the input."""
-    seen = model.known
-    given, made = quantity_in_words(model.input_quantity), quantity_in_words(model.output_quantity)
-    if seen is None:  # the ends of any other form are those of the record
-        taken = with_unit(_ends(drive.compensated), model.input_unit)
-        said = (
-            f"the {given} goes over {taken}, ends that follow from the weights: this model does not say what"
-        )
-        return [f"{said} was recorded"] if model.form == "dual" else []
-    least = 0.01 * _SLIGHT * (seen.output_high - seen.output_low)
-
-    def within(output: FloatArray) -> bool:
-        return bool(output.min() >= seen.output_low - least and output.max() <= seen.output_high + least)
-
-    if within(drive.predicted):
-        return []
-    foretold = with_unit(_ends(drive.predicted), model.output_unit)
-    recorded = with_unit(f"{seen.output_low:.4g} .. {seen.output_high:.4g}", model.output_unit)
-    where = " in the strokes before and after the pulse" if within(drive.predicted[drive.scored]) else ""
-    said = f"by the model the {made} goes over {foretold}{where}, and its record holds {recorded}"
-    return [f"{said}: what the device does beyond was never seen"]
-
-
-def _ends(values: FloatArray) -> str:
-    return f"{values.min():.4g} .. {values.max():.4g}"
-
-
-def _jumps(shape: Shape) -> list[str]:
-    """Say it where a pulse does not end where it begins, since one period follows another."""
-    value = shape.value
-    apart = abs(float(value[0] - value[-1]))
-    if apart <= max(_SEAM * float(np.ptp(value)), _SEAM_STEPS * float(np.abs(np.diff(value)).max())):
-        return []
-    said = f"{shape.name} ends at {value[-1]:.4g}, but begins at {value[0]:.4g}"
-    return [f"{said}: each period begins with a jump, unless the values lead back to the first"]
 
 
 def _compensated(part: Invertible, method: Inversion, layout: Layout) -> tuple[FloatArray, int]:

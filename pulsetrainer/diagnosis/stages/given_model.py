@@ -62,7 +62,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 _CHANGED, _SPEED = "condition-change", "viscous"
 _NOTHING = ("none", "inconclusive", "unknown")
-_OF_WHAT_IS_LEFT = ("slow noise", "bursts", "not accepted")  # evidence of these kinds
+_OF_THE_REST = ("slow noise", "bursts", "not accepted")  # evidence of what is left
 
 
 def stage(state: State) -> State:
@@ -258,7 +258,7 @@ def _without_errors_of_its_own(state: State, judged: Judged) -> State:
     """Return the state without what it says of what is left, if that is mostly an error of coarser levels."""
     if _left_by_given(state, judged) > 0.5 * state.scale.span * state.baseline.rms:
         return state
-    return replace(state, evidence=tuple(one for one in state.evidence if one.kind not in _OF_WHAT_IS_LEFT))
+    return replace(state, evidence=tuple(one for one in state.evidence if one.kind not in _OF_THE_REST))
 
 
 def _left_by_given(state: State, judged: Judged) -> float:
