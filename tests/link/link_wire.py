@@ -93,7 +93,7 @@ class Wire:
         self.ask(m.Start())
         return hello
 
-    def wait_for(self, *states: codes.State, seconds: float = 5.0) -> m.StatusReply:
+    def wait_for(self, *states: codes.State, seconds: float = 10.0) -> m.StatusReply:
         """Return the status once the device is in one of ``states``."""
         deadline = time.monotonic() + seconds
         while True:

@@ -94,23 +94,23 @@ def test_too_long_an_on_time_is_refused(wire):
     assert caught.value.nak.code == NakCode.RANGE
 
 
-@pytest.mark.parametrize("speed", ["real", "max"])
-def test_a_silent_host_trips_the_heartbeat(wire, speed):
+@pytest.mark.parametrize(("speed", "silent_s"), [("real", 1.0), ("max", 2.5)])
+def test_a_silent_host_trips_the_heartbeat(wire, speed, silent_s):
     """200 ms of device time without a command: ramp down, off, latched."""
     one = wire(f"bench:?speed={speed}")
     one.start(np.full(1000, 5000, dtype=np.int16))
-    time.sleep(1.0)
+    time.sleep(silent_s)
     status = one.wait_for(State.FAULT)
     assert status.fault == Fault.HEARTBEAT
     assert 2000 <= status.fault_tick <= 2100
 
 
-@pytest.mark.parametrize(("speed", "pause_s"), [("real", 0.08), ("max", 0.3)])
+@pytest.mark.parametrize(("speed", "pause_s"), [("real", 0.08), ("max", 0.3), ("max", 1.5)])
 def test_a_slow_host_does_not_trip_the_heartbeat(wire, speed, pause_s):
     """A command now and then is enough; at full speed the device waits for a host that is merely slow."""
     one = wire(f"bench:?speed={speed}")
     one.start(np.full(900, 5000, dtype=np.int16))
-    for _ in range(4):
+    for _ in range(4 if pause_s < 1 else 1):
         time.sleep(pause_s)
         one.beat()
     assert one.status().fault == Fault.NONE

@@ -8,7 +8,7 @@
  *     give equal numbers however long the pauses between them were;
  *   - armed but not started, and while playing whenever the host has been silent for half the
  *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
- *     for at most half a second of wall time after the last heartbeat, and three seconds in all; after that it
+ *     for at most two seconds of wall time after the last heartbeat, and five in all; after that it
  *     goes on at the wall clock, so that a host that is really gone trips the 200 ms heartbeat like on a real device,
  *     and one that lives but sends no more samples an underrun.
  * Wall time in which this process itself did not run is no silence of the host: both were asleep.
@@ -21,7 +21,7 @@
 #define BATCH 10                    /* ticks between two looks at the pty */
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
 #define SETTLE_TICKS 2000           /* after the output went off; less than the watchdog waits */
-#define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
+#define GRACE_NS 2000000000         /* wall time that a stalled device waits for its host: longer than a busy computer keeps one off */
 #define PATIENCE_NS 3000000000      /* the same for one that beats, but has nothing to play */
 #define CATCH_UP_NS 50000000        /* a computer that was busy: what is lost is lost, or the host looks silent */
 #define LOOK_MS 20                  /* a stalled device looks at the clock this often; less than CATCH_UP_NS */
