@@ -132,9 +132,9 @@ def at_once() -> dict[str, Mistake]:
         name: Mistake(line, 2, next((word for word in line if word in named), ""))
         for name, line in words.items()
     }
-    found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got 'model.h5'")
+    found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "'model.h5' is one too many")
     found["an argument to a command of none"] = Mistake(
-        ("tune", "now"), 2, "only options, got 'now'", "to name a drive: --drive"
+        ("tune", "now"), 2, "only options; 'now' is one too many", "to name a drive: --drive"
     )
     for name, (line, code, where, then) in _WORDS_OF_A_TIRED_HAND.items():
         found[name] = Mistake(tuple(line.split()), code, where, then)
@@ -251,19 +251,38 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "invert normal bifid --model model.h5 -o out.h5",
             2,
-            "takes WAVEFORM, got 'bifid' as well",
+            "takes WAVEFORM; 'bifid' is one too many",
             "if it is another pulse: one at a time, each with an output",
         ),
     ),
-    "a file that a look at the device does not take": ("doctor run.h5", 2, "got 'run.h5'", "leave it out"),
-    "a word for a look at the device": ("doctor now", 2, "only options, got 'now'", "leave it out\n"),
+    "a file that a look at the device does not take": (
+        "doctor run.h5",
+        2,
+        "'run.h5' is one too many",
+        "leave it out",
+    ),
+    "a word for a look at the device": (
+        "doctor now",
+        2,
+        "only options; 'now' is one too many",
+        "leave it out\n",
+    ),
     "a port without its option": (
-        *("capture identification /dev/ttyUSB0 -o out.h5", 2, "got '/dev/ttyUSB0' as well"),
+        *("capture identification /dev/ttyUSB0 -o out.h5", 2, "'/dev/ttyUSB0' is one too many"),
         "a port is an option: --port /dev/ttyUSB0\n",
     ),
-    "two words too many": ("tune now then", 2, "takes only options, got 'now', 'then'", "leave it"),
+    "two words too many": (
+        "tune now then",
+        2,
+        "takes only options; 'now', 'then' are too many",
+        "leave them out",
+    ),
     "pulses with a blank": (
-        *("session --model model.h5 --pulses normal bifid -o out.h5", 2, "only options, got 'bifid'"),
+        *(
+            "session --model model.h5 --pulses normal bifid -o out.h5",
+            2,
+            "only options; 'bifid' is one too many",
+        ),
         "pulses are an option: --pulses normal,bifid\n",
     ),
     "a table that is absent": (
@@ -346,7 +365,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "a file behind a switch": (
         "check model.h5 --update out.h5",
         2,
-        "got 'out.h5'",
+        "'out.h5' is one too many",
         "to write is an option: -o out.h5",
     ),
     "a drive refined over itself": (
@@ -441,7 +460,12 @@ _WORDS_OF_A_TIRED_HAND = {
     "a port to look at": ("ports --port /dev/ttyUSB0", 2, "no option --port", "pulsetrainer doctor --port"),
     "a version behind a command": ("identify --version", 2, "no option --version", "pulsetrainer --version"),
     "a diagnosis without its option": (
-        *("correct run.h5 diagnosis.h5 -o out.h5", 2, "got 'diagnosis.h5'", "--diagnosis diagnosis.h5"),
+        *(
+            "correct run.h5 diagnosis.h5 -o out.h5",
+            2,
+            "'diagnosis.h5' is one too many",
+            "--diagnosis diagnosis.h5",
+        ),
     ),
     "a name that begins with a dash": (
         *("identify -run.h5 -o out.h5", 2, "no option -run.h5", "the name of a file, write ./-run.h5"),
@@ -579,7 +603,12 @@ _WORDS_OF_A_TIRED_HAND = {
         "--json alone",
     ),
     "settings without their option": (
-        *("tune pulsetrainer.toml", 2, "got 'pulsetrainer.toml'", "is an option: -o pulsetrainer.toml"),
+        *(
+            "tune pulsetrainer.toml",
+            2,
+            "'pulsetrainer.toml' is one too many",
+            "is an option: -o pulsetrainer.toml",
+        ),
     ),
     "a model behind an option where none goes": (
         *("check --model model.h5", 2, "no option --model", "pulsetrainer check model.h5"),
@@ -595,7 +624,7 @@ _WORDS_OF_A_TIRED_HAND = {
         *("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out or --overwrite?\n"),
     ),
     "a table with spaces, where none goes": (
-        *("show two words.csv", 2, "got 'words.csv' as well"),
+        *("show two words.csv", 2, "'words.csv' is one too many"),
         "in quotes, and import the table first: pulsetrainer import 'two words.csv' --input",
     ),
     "a table with spaces, of several files": (
@@ -1043,27 +1072,29 @@ INSIDE = {
         ("session", "--model", "model.h5", "drive.h5", "-o", "out.h5"),
         *(
             2,
-            "only options, got 'drive.h5'",
+            "only options; 'drive.h5' is one too many",
             "a session makes its own drives; to play one: pulsetrainer play drive.h5",
         ),
     ),
     "a run for a check": Mistake(
-        *(("check", "model.h5", "run.h5"), 2, "got 'run.h5' as well"),
+        *(("check", "model.h5", "run.h5"), 2, "'run.h5' is one too many"),
         "leave it out; to test a model on a run: pulsetrainer evaluate run.h5 --model model.h5\n",
     ),
     "two models to check": Mistake(
-        ("check", "model.h5", "plain/model.h5"), 2, "got 'plain/model.h5'", "one model at a time"
+        ("check", "model.h5", "plain/model.h5"), 2, "'plain/model.h5' is one too many", "one model at a time"
     ),
     "a model for a drive": Mistake(
         ("play", "drive.h5", "model.h5", "-o", "out.h5"),
         2,
-        "got 'model.h5'",
+        "'model.h5' is one too many",
         "a drive already holds all that",
     ),
     "a drive to tune by": Mistake(
-        ("tune", "drive.h5"), 2, "got 'drive.h5'", "a drive is an option: --drive drive.h5\n"
+        ("tune", "drive.h5"), 2, "'drive.h5' is one too many", "a drive is an option: --drive drive.h5\n"
     ),
-    "a run to tune by": Mistake(("tune", "run.h5"), 2, "got 'run.h5'", "to name a drive: --drive drive.h5"),
+    "a run to tune by": Mistake(
+        ("tune", "run.h5"), 2, "'run.h5' is one too many", "to name a drive: --drive drive.h5"
+    ),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"),
@@ -1282,7 +1313,12 @@ _UNREADABLE = {
         *(_INVERT, "t,value\n2024-05-01,0\n2024-05-02,1\n2024-05-03,0\n"),
         *("'2024-05-01' in line 2", "write the time in seconds, or a date with its time"),
     ),
-    "blank.csv": (_IMPORT, "t,I,F\n0,0,0\n1,,1\n", "has a blank cell in column I, line 3", "remove those"),
+    "blank.csv": (
+        _IMPORT,
+        "t,I,F\n0,0,0\n1,,1\n",
+        "has a blank cell in column I, line 3",
+        "remove that row, or",
+    ),
     "overload.csv": (_IMPORT, "t,I,F\n0,0,0\n1,1,9.9e37\n", "(an overload) in column F, line", "remove"),
     "none.csv": (_IMPORT, "t,I,F\n0,,0\n1,,1\n2,,2\n", "no numbers in column I: all 3 rows", "name another"),
     "side.csv": (

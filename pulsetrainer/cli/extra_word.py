@@ -49,15 +49,16 @@ def one_too_many(extra: str, command: str, parsed: Any, words: Sequence[str]) ->
     if word.lower() in SWITCHED and any(before in (*p.opts, *p.secondary_opts) for p in params):
         return for_a_switch(before, word, params)
     taken = " and ".join(named(p) for p in params if not p.opts[0].startswith("-")) or "only options"
-    as_well = " as well" * (taken != "only options")
+    too_many = "is one too many" if len(every) == 1 else "are too many"
     return UsageError(
-        f"{command} takes {taken}, got {', '.join(map(repr, every))}{as_well}",
-        hint=in_quotes(words, name) or _meant_by(word, (name, taken), params, words),
+        f"{command} takes {taken}; {', '.join(map(repr, every))} {too_many}",
+        hint=in_quotes(words, name) or _meant_by(every, (name, taken), params, words),
     )
 
 
-def _meant_by(word: str, of: tuple[str, str], params: Sequence[Any], words: Sequence[str]) -> str:
-    """What to do with a word too many: what it is tells what it was meant for."""
+def _meant_by(every: list[str], of: tuple[str, str], params: Sequence[Any], words: Sequence[str]) -> str:
+    """What to do with words too many: what the first is tells what it was meant for."""
+    word, single = every[0], len(every) == 1
     kind, quoted, typed = likely_kind(Path(word)), shlex.quote(word), {one.partition("=")[0] for one in words}
     taken = {one.opts[0]: HOLDS.get(one.name, ()) for one in params if not typed & {*one.opts}}
     unknown, port = not kind and word.endswith(".h5"), quoted if _PORT.match(word) else "PORT"
@@ -71,7 +72,7 @@ def _meant_by(word: str, of: tuple[str, str], params: Sequence[Any], words: Sequ
         f"pulses are an option: --pulses {pulses}": of[0] == "session" and {*word.split(",")} <= {*library()},
         f"the file to write is an option: -o {quoted}": "-o" in taken and to_write,
         f"one {in_words([kind])} at a time: run it once for each": any(kind in one for one in taken.values()),
-        f"leave it out{also and '; '}{also.format(extra=quoted, port=port)}": True,
+        f"leave {'it' if single else 'them'} out{also and '; '}{also.format(extra=quoted, port=port)}": True,
     }
     return next(way for way, fits in ways.items() if fits)
 

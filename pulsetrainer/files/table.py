@@ -122,7 +122,8 @@ class Table:
             raise DataError(
                 f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
                 f"({_lacking(bad.size, values.size)}: {self.places(bad)})",
-                hint=f"remove those rows, or {_AGAIN if self.mostly(bad) else remedy}",
+                hint=f"remove {'that row' if bad.size == 1 else 'those rows'}, "
+                f"or {_AGAIN if self.mostly(bad) else remedy}",
             )
         if said := beyond_all_quantities(values):
             first = self.place(int(np.argmax(np.abs(values) > LARGEST)))

@@ -160,8 +160,9 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
         "seconds": float(waveform.time_s[-1]),
         "target": span_words(waveform.target[waveform.scored], waveform.output_unit),
         "compensated drive": span_words(waveform.compensated, waveform.input_unit),
-        **picked(waveform, "clipped_samples", "source"),
-        **(_refined(waveform) if waveform.passes else {}),
+        "clipped_samples": waveform.clipped_samples,
+        **(_refined(waveform) if waveform.passes else picked(waveform, "predicted_max_error_percent")),
+        "source": waveform.source,
     }
 
 

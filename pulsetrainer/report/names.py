@@ -30,6 +30,7 @@ NAMES: Final = {
     "max_abs_error_percent": Named("max error", FORCE),
     "rms_error_percent": Named("rms error", FORCE),
     "hysteresis_percent": Named("loop area", "% of full force²"),
+    "predicted_max_error_percent": Named("max error expected", FORCE),
     "current_tracking_max_percent": Named("max current error", "% of range"),
     "mean_error_reduction_percent": Named("reduction of the mean error", "% of scaled"),
     "noise_percent": Named("spread between repeats", FORCE),

@@ -70,6 +70,16 @@ def test_show_and_plot_take_every_kind(built_small):
     assert (built_small / "run.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_show_tells_the_error_that_a_drive_is_expected_to_have(built_small):
+    """As ``invert`` told it; of a playback the same."""
+    made = ["invert", "normal", "--model", "model-relay.h5", "-o", "again.h5"]
+    told = pulsetrainer(built_small, *made, "--json").json["predicted_max_error_percent"]
+    for name in ("again.h5", "played-normal-relay.h5"):
+        shown = pulsetrainer(built_small, "show", name, "--json").json["facts"]
+        assert shown["predicted_max_error_percent"] == pytest.approx(told)
+    assert "max error expected, % of full force" in pulsetrainer(built_small, "show", "again.h5").out
+
+
 def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):
     """Progress is for people: nothing of it in a pipe, a moving bar on a terminal, none with --json."""
     words = ["capture", "identification", "--levels", "6", "--speed", "12", "--overwrite", "-o", "run.h5"]
