@@ -289,7 +289,7 @@ _WORDS_OF_A_TIRED_HAND = {
         "import absent.csv -o out.h5",
         2,
         "absent.csv does not exist; and --input (column of the input, by its heading or number) and --output",
-        "no file here has a similar one; and name the columns, such as --input 2 --output 3\n",
+        "no file here has a similar name; and name the columns, such as --input 2 --output 3\n",
     ),
     "json before the command": (
         *("--json show run.h5", 2, "pulsetrainer has no option --json"),
@@ -540,7 +540,7 @@ _WORDS_OF_A_TIRED_HAND = {
         ),
     ),
     "a bound of words": (
-        *("evaluate played.h5 --bounds words.toml", 2, "got ['a', 'b']", "= [90.0, 100.0], the lowest first"),
+        *("evaluate played.h5 --bounds words.toml", 2, "got ['a', 'b']", "= [90.0, 100.0], the lower first"),
     ),
     "a delay that is no number": (
         *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay nan", 2),
@@ -576,7 +576,7 @@ _WORDS_OF_A_TIRED_HAND = {
         *(
             "evaluate played.h5 --bounds pulse.toml",
             2,
-            "normal in pulse.toml is not the name of",
+            "'normal' in pulse.toml is not the full name of a value",
             "normal.continuous.mean",
         ),
     ),
@@ -700,7 +700,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a bound in quotes": (
         *("evaluate played.h5 --bounds percent.toml", 2, "got ['90%', '98%']"),
-        "= [90.0, 98.0], the lowest first, without quotes and without %",
+        "= [90.0, 98.0], the lower first, without quotes and without %",
     ),
     "two ports": (
         *("play drive.h5 -o out.h5 --port bench: --port bench:?seed=3", 2, "--port was given 2 times"),
@@ -850,14 +850,14 @@ INSIDE = {
     "two lines of headings": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "-o", "out.h5"),
         *(3, "two lines of headings; the second should hold units, but 'Time' below 'Channel'"),
-        "delete one of the two lines, or correct 'Time'",
+        "delete the first, and name the columns by the second; otherwise write a unit in place of 'Time'",
     ),
     "two lines of headings, and a rate": Mistake(
         ("import", "heads.csv", "--input", "CH1", "--output", "CH2", "--rate", "10", "-o", "out.h5"),
         *(
             3,
-            "'Current' in the second line of headings of heads.csv, which should hold units, below 'CH1'",
-            "delete one of the two lines, or give a known unit, such as --input-unit N or mm/s^2",
+            "'Current' in the second line of headings of heads.csv, below 'CH1', is not a known unit",
+            "by the second; otherwise give a known unit, such as --input-unit A or mm/s^2",
         ),
     ),
     "cells with their units": Mistake(
@@ -1118,13 +1118,16 @@ INSIDE = {
         "stay inside, such as --force-max 13.6\n",
     ),
     "bounds that are no text": Mistake(
-        ("evaluate", "played.h5", "--bounds", "run.h5"), 2, "not a text file", "write it as TOML"
+        ("evaluate", "played.h5", "--bounds", "run.h5"),
+        2,
+        "run.h5 has no bounds in it: it is not a text file",
+        "name another file",
     ),
     "a metric that is nearly one": Mistake(
         ("evaluate", "played.h5", "--bounds", "bounds.toml"),
         2,
         "normal.continuous.mean_err",
-        "A name here is normal.continuous, a dot, and one of mean_error_reduction_percent",
+        "Names here begin with normal.continuous and a dot, and end with mean_error_reduction_percent",
     ),
     "learnt from a drive that was not refined": Mistake(
         ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
@@ -1220,14 +1223,18 @@ INSIDE = {
     ),
     "dates that go back": Mistake(
         ("import", "back.csv", "--input", "I [A]", "--output", "F [N]", "-o", "out.h5"),
-        *(3, "at line 3: 2024-01-01 10:00:02 after 2024-01-01 10:00:03", "sort the rows"),
+        *(
+            3,
+            "at line 3: 2024-01-01 10:00:02 after 2024-01-01 10:00:03",
+            "if the rows are out of order, sort them; if two records",
+        ),
     ),
     "a heading that two columns have": Mistake(
         ("import", "twice.csv", "--input", "x", "--output", "x", "-o", "out.h5"),
         *(
             3,
             "has 2 columns with the heading 'x'; they are called x#1, x#2",
-            "name one of them: 'x#1' or 'x#2'",
+            "choose by the name with its number: 'x#1' or 'x#2'",
         ),
     ),
     "a column without a name": Mistake(
@@ -1356,7 +1363,7 @@ _UNREADABLE = {
         *(_CAPTURE, "t_s,current_A\n0,0\n1,1,2\n2,0\n"),
         *(
             "has 3 columns in line 3",
-            "if 1,2 is a decimal comma, write 1.2, or separate the columns by semicolons\n",
+            "write 1.2, or separate the columns by semicolons; otherwise remove a cell\n",
         ),
     ),
 }

@@ -238,7 +238,7 @@ MESSAGES = {
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),
     "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------
-    "no such metric": Message("does not have", "A name here is", "{metric}"),
+    "no such metric": Message("does not have", "Names here begin with", "{metric}"),
     "out of bounds": Message("1 of 1 bound in", "the bound", "{metric}", "[99, 100]", " = "),
     "bug": Message("a bug: KeyError: 'force'", "--debug"),
 }

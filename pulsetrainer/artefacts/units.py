@@ -153,11 +153,12 @@ def check_unit(text: str, what: str, where: str = "", remedy: str = "") -> str:
     known += [unit for unit in (*_SUFFIXES.split(), *_OFFERED) if unit.lower() == text.lower()]
     # a heading may have any word there
     near = known[:1] or ([] if where else difflib.get_close_matches(text, _OFFERED, n=2, cutoff=0.5))
+    usual = "A" if "input" in what else "N"
     raise DataError(
         f"{text!r} in {where} is not a known unit" if where else f"{what} {text!r} is not a known unit",
         hint=f"did you mean {' or '.join(repr(n) for n in near)}? Write {what} {near[0]}"
         if near
-        else f"{remedy}give a known unit, such as {what} N or mm/s^2; 1 stands for a pure number, "
+        else f"{remedy}give a known unit, such as {what} {usual} or mm/s^2; 1 stands for a pure number, "
         "% and ‰ for its hundredths and thousandths",
     )
 

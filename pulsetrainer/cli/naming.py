@@ -111,7 +111,7 @@ class Command(TyperCommand):
 
 def _with_file(said: str, given: Any) -> str:
     """Return a message with the file of the model, the drive or the bounds that it begins with."""
-    found = re.match(r"the (model|drive|bounds) (?=takes |is of |is in |name |holds |has )", said)
+    found = re.match(r"the (model|drive|bounds) (?=takes |is of |is in |have |holds |has )", said)
     file = given.get(found[1]) if found else None
     file = file[0] if isinstance(file, list | tuple) and len(file) == 1 else file
     return f"{found[0]}{file} {said[found.end() :]}" if found and isinstance(file, str | Path) else said

@@ -17,8 +17,8 @@ FORCE_READING = (
 _OTHERWISE = "otherwise "
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: f"if nothing pressed that hard, check the force sensor; {_OTHERWISE}"
-    "capture with `current_max_A` well below the current given here, and make drives from that run",
+    codes.Fault.OVER_FORCE: f"if the force cannot have been so high, check the force sensor; {_OTHERWISE}"
+    "capture with `current_max_A` well below that current, identify that run, and go on with its model",
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.CURRENT_FROZEN: "check the current sensor, its wires and its supply",

@@ -34,7 +34,10 @@ class Term:
     def at_bounds(self, frame: Frame) -> list[bool]:
         """Tell for each parameter whether it lies at an end of what was searched."""
         bounds = self.cause.quantities(frame)
-        return [value in (one.low, one.high) for value, one in zip(self.values, bounds, strict=True)]
+        return [
+            value in (one.low, one.high) and not one.whole
+            for value, one in zip(self.values, bounds, strict=True)
+        ]
 
 
 def in_order(terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -30,7 +30,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late, RecordedLate, Values
+from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder, Frame, Late, RecordedLate, Values
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in
@@ -320,9 +320,13 @@ def _start(block: _Block, residual: FloatArray, frame: Frame) -> Values:
 
 def in_place(term: Term, score: Score) -> Term:
     """Return the cause of a score in the place of another, and as late where both are late."""
-    return Term(score.cause, term.values if both_late(score, term) else score.start)
+    if not both_late(score, term):
+        return Term(score.cause, score.start)
+    if isinstance(score.cause, FirstOrder) and isinstance(term.cause, FirstOrder):
+        return Term(score.cause.as_fine_as(term.cause), term.values)
+    return Term(score.cause, term.values[:1])
 
 
 def both_late(score: Score, term: Term) -> bool:
-    """Whether both have one parameter, which says how late they make the output, or the input."""
+    """Whether both begin with a parameter that says how late they make the output, or the input."""
     return any(isinstance(score.cause, one) and isinstance(term.cause, one) for one in (Late, RecordedLate))

@@ -11,7 +11,7 @@ from pathlib import Path
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.settings import leaves, read_toml
 
-_HOW = 'write one line for each figure, such as: "normal.continuous.mean_error_reduction_percent" = [90, 100]'
+_HOW = 'write one bound a line, such as: "normal.continuous.mean_error_reduction_percent" = [90, 100]'
 
 
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
@@ -20,9 +20,7 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
     UsageError where the file cannot be read, is no TOML or is empty, or a bound is not a pair low <= high.
     """
     if not path.exists():
-        raise UsageError(
-            f"the file of bounds {path} does not exist", hint=f"check its name; to make it, {_HOW}"
-        )
+        raise UsageError(f"the bounds file {path} does not exist", hint=f"check its name; to make it, {_HOW}")
     bounds = {}
     for name, pair in leaves(read_toml(path, "bounds")):
         match pair:
@@ -36,14 +34,16 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                         usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
                 tables = re.search(r"^\s*\[", path.read_text(encoding="utf-8"), re.MULTILINE)
                 key = name.rpartition(".")[2] if tables else json.dumps(name)
-                hint = f"write {key} = {usual}, the lowest first"
+                hint = f"write {key} = {usual}, the lower first"
                 if "'" in repr(pair):
                     hint += ", without quotes and without %"
                 if type(pair) in (int, float):
                     least = f"[{pair}, {100 if pair <= 100 else 'inf'}] if at least {pair} is meant"
                     hint = f"write {key} = {least}, [0, {pair}] if at most"
                 if "." not in name:
-                    raise UsageError(f"{name} in {path} is not the name of a figure with bounds", hint=_HOW)
+                    raise UsageError(
+                        f"{name!r} in {path} is not the full name of a value that is judged", hint=_HOW
+                    )
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}", hint=hint
                 )

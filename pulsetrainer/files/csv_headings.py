@@ -18,6 +18,10 @@ _LINES = 3  # names, units, and words below them
 _TABLE = 10  # rows of one kind make a table of what stands below a text
 _OF_REMARKS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
+# what to do where the second line of headings should hold units, and has a word
+NO_UNITS = (
+    "if the second line holds no units, delete the first, and name the columns by the second; otherwise "
+)
 
 
 class Line(NamedTuple):

@@ -91,7 +91,8 @@ def _of_a_comma(cells: Sequence[str]) -> str:
     if not pairs:
         return ""
     comma, point = ",".join(pairs[-1]), ".".join(pairs[-1])
-    return f"if {comma} is a decimal comma, write {point}, or separate the columns by semicolons"
+    mend = f"write {point}, or separate the columns by semicolons"
+    return f"if {comma} is a decimal comma, {mend}; otherwise remove a cell"
 
 
 class _Kept:

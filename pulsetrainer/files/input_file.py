@@ -149,7 +149,7 @@ def _names_in(folder: Path, path: Path) -> str:
     return (
         f"files {where}: {offered}"
         if offered
-        else f"check the name, or give the full path: no file {where} has a similar one"
+        else f"check the name, or give the full path: no file {where} has a similar name"
     )
 
 

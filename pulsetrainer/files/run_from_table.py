@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pulsetrainer.artefacts import Run
 from pulsetrainer.artefacts.units import SECONDS, check_unit, counted, same_units, split_unit
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.csv_headings import NO_UNITS
 from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.time_column import (
     LEAVE_OUT,
@@ -231,8 +232,8 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     heading = table.heading(column)
     if split_unit(heading)[1]:
         return check_unit(own, what, f"the heading {heading!r} of {table.path}")
-    where = f"the second line of headings of {table.path}, which should hold units, below {heading!r},"
-    return check_unit(own, what, where, "delete one of the two lines, or ")
+    where = f"the second line of headings of {table.path}, below {heading!r},"
+    return check_unit(own, what, where, NO_UNITS)
 
 
 def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:

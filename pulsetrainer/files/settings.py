@@ -75,7 +75,7 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
         if not Path(chosen).is_file():
             is_what = "is a folder" if Path(chosen).is_dir() else "does not exist"
             raise UsageError(
-                f"the file of settings {chosen} {is_what}",
+                f"the settings file {chosen} {is_what}",
                 hint="check its name, or leave --settings out"
                 if named
                 else f"check its name, or unset the variable {VARIABLE}",
@@ -124,7 +124,11 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         if isinstance(error, PermissionError):
             raise UsageError(f"you have no permission to read {path}", hint=permit(path)) from error
-        reason = "it is not a text file" if isinstance(error, UnicodeDecodeError) else error
+        if isinstance(error, UnicodeDecodeError):
+            raise UsageError(
+                f"{path} has no {what} in it: it is not a text file",
+                hint=f"name another file, of lines such as: {_TOML_LINES[what]}",
+            ) from error
         line = _line_of(error, path)
         if "overwrite" in str(error):  # as the reader of TOML calls what stands there twice
             number = re.search(r"line \d+", str(error))
@@ -135,7 +139,7 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
             ) from error
         comma = re.fullmatch(r"\s*(\S+\s*=\s*-?\d+),(\d+)\s*", line)
         raise UsageError(
-            f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
+            f"the {what} in {path} cannot be read: {error}" + (f": {line.strip()}" if line else ""),
             hint=f"write the number with a point: {comma[1]}.{comma[2]}"
             if comma
             else "put text with backslashes in single quotes"

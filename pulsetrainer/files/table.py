@@ -190,7 +190,7 @@ class Table:
             return DataError(
                 f"{self.path} has {len(same)} columns with the heading {name!r}; they are "
                 f"called {', '.join(same)}",
-                hint=f"name one of them: {' or '.join(map(repr, same))}",
+                hint=f"choose by the name with its number: {' or '.join(map(repr, same))}",
             )
         if name in self.left_out:
             return DataError(
@@ -219,6 +219,10 @@ class Table:
 
 def _lacking(bad: int, rows: int) -> str:
     return f"{bad} of {counted(rows, 'row')} {'lacks' if bad == 1 else 'lack'} a number"
+
+
+def _bad(bad: int, rows: int) -> str:
+    return f"{bad} of {counted(rows, 'row')} {'is' if bad == 1 else 'are'} bad"
 
 
 def _alike(one: str, other: str) -> bool:
@@ -291,7 +295,7 @@ def read_table(
             )
         mend = rows.remedy or f"correct or remove {'that line' if bad.size == 1 else 'those lines'}"
         raise DataError(
-            f"{rows.misfit} ({_lacking(bad.size, table.rows)}: {table.places(bad)})",
+            f"{rows.misfit} ({_bad(bad.size, table.rows)}: {table.places(bad)})",
             hint=mend + (remedy and f", or {_AGAIN if table.mostly(bad) else remedy}"),
         )
     return table

@@ -17,7 +17,7 @@ from pulsetrainer.artefacts.time_steps import BLOCK, steps_of
 from pulsetrainer.artefacts.units import SECONDS, claimed_unit, counted, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_cells import quoted
-from pulsetrainer.files.csv_headings import column_words
+from pulsetrainer.files.csv_headings import NO_UNITS, column_words
 from pulsetrainer.files.csv_rows import cell_at
 from pulsetrainer.files.table import Table
 from pulsetrainer.files.time_stamps import how_to_write, is_since_1970, stated_rate, unit_of_count
@@ -164,7 +164,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
             raise DataError(
                 f"{table.path} has two lines of headings; the second should hold units, but {unit!r} below "
                 f"{name!r} is not a unit of time, {expected}",
-                hint=f"delete one of the two lines, or correct {unit!r} if the second does hold units",
+                hint=f"{NO_UNITS}write a unit in place of {unit!r}, such as s",
             )
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, {expected}",
@@ -198,9 +198,9 @@ def _remedy(table: Table, time_s: FloatArray, back: NDArray[np.intp], *, dated: 
             f"write the stamps with their offset from UTC (2024-10-27T02:00:00+01:00){instead}"
         )
     if time_s[row] != time_s[row - 1]:
-        other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
-        return "sort the rows" + other * of_record
-    return f"its time stamps are repeated, or rounded too coarsely: write them with more digits{instead}"
+        other = "; if two records follow each other, cut the file in two; else choose another `time` column, "
+        return "if the rows are out of order, sort them" + f"{other}or give a `rate_Hz`" * of_record
+    return f"delete a row that is there twice; if the times are rounded, write them with more digits{instead}"
 
 
 def _is_winter_time(step: FloatArray, back: NDArray[np.intp]) -> bool:

@@ -341,9 +341,9 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
         near = difflib.get_close_matches(unknown[0], figures, n=1)
         own = [name.removeprefix(f"{stems[0]}.") for name in figures if name.startswith(f"{stems[0]}.")]
         raise UsageError(
-            f"the bounds name {unknown[0]}, which this evaluation does not have",
+            f"the bounds have a name that this evaluation does not have: {unknown[0]}",
             hint=(f"did you mean {near[0]}? " if near else "")
-            + f"A name here is {' or '.join(stems)}, a dot, and one of {', '.join(own)}",
+            + f"Names here begin with {' or '.join(stems)} and a dot, and end with {', '.join(own)}",
         )
     return tuple(
         Breach(name, value, low, high)

@@ -132,7 +132,7 @@ def check_refined(refined: Waveform) -> Model:
     if not refined.passes:
         raise DataError(
             f"the drive of {refined.name} given as `learnt` was never refined, so it has learnt nothing",
-            hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
+            hint="refine it, pulsetrainer refine REFINED.h5 -o refined.h5, and give `learnt` refined.h5",
         )
     return check(refined, passes=1)
 

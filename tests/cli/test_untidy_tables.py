@@ -67,12 +67,12 @@ def test_text_and_rows_of_the_wrong_length_are_left_out_when_asked(tmp_path):
         299: "6e-6",
     }
     _with_bad_rows(tmp_path / "a.csv", bad)
-    where = "6 of 300 rows lack a number: lines 7, 8, 11, 102, 202, ..."
+    where = "6 of 300 rows are bad: lines 7, 8, 11, 102, 202, ..."
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
     refusal(done, 3, "bad rows", file="a.csv", place="'ERR' in column u (kOhm), line 7", where=where)
     done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
     assert done.code == 0, done
-    assert where.removeprefix("6 of 300 rows lack a number: ") in done.err
+    assert where.removeprefix("6 of 300 rows are bad: ") in done.err
     run = store.read(tmp_path / "a.h5", Run)
     np.testing.assert_array_equal(run.output, np.delete([row[2] for row in _rows()], list(bad)))
     _with_bad_rows(tmp_path / "b.csv", {7: "1,ERR,1"})

@@ -181,7 +181,7 @@ def test_heat_may_move_the_zero():
     frame = _frame(np.full(T.size, 3.0), low=-1.0, ends=(-3.0, 5.0), zero=-3.0)
     y, k, tau, shift = 2.0 + T, 0.02, 0.7, -0.3
     for plain in CAUSE["thermal-drift"].kinds():
-        ((moving, none),) = plain.finer(frame)
+        ((moving, none),) = plain.finer(frame, ())
         still = plain.on_output(y, (k, tau), frame)
         np.testing.assert_array_equal(moving.on_output(y, (k, tau, none), frame), still)
         heat = (y - still) / (k * (y - (1.0 if plain.kind else -3.0)))
@@ -190,7 +190,7 @@ def test_heat_may_move_the_zero():
         kept = tuple(value for _, value, _ in moving.constants())
         again, values = CAUSE["thermal-drift"].restored((*kept, k, tau, shift))
         np.testing.assert_array_equal(again.on_output(y, values, frame), shown)
-        assert moving.finer(frame) == []
+        assert moving.finer(frame, ()) == []
         assert len(moving.quantities(frame)) == len(plain.quantities(frame)) + 1
 
 

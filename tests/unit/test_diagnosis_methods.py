@@ -238,7 +238,10 @@ def test_a_drift_that_relaxes_is_told_to_its_begin():
     ):  # of the record, to relax in; backwards: it grows
         drift = 0.5 * (1.0 - np.exp(-way / (share * t[-1])))
         problem = problem_for([Record(u, 3.0 * u + drift, dt_s=0.01)], 0.0, 1.5)
-        begun = [Term(cause, (0.01, 0.0, value)) for cause, value in CAUSE["offset-drift"].finer(frame)]
+        begun = [
+            Term(cause, (0.01, 0.0, value))
+            for cause, value in CAUSE["offset-drift"].finer(frame, (0.01, 0.0))
+        ]
         fits = [refit(problem, (one,), None) for one in begun]
         (term,) = min(fits, key=lambda fitted: fitted.squares).terms
         left = drift - term.cause.on_output(0.0 * u, term.values, frame)

@@ -586,7 +586,7 @@ def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(
     known = tuple(Estimate(name, 0.1, "", lower, 0.2) for name in ("rate", "bend", "slowing"))
     monkeypatch.setattr(exchange, "estimates_of", lambda *_: {"offset-drift": known})
     drift = CAUSE["offset-drift"]
-    tried = drift.finer(PROBLEM.frames[0])
+    tried = drift.finer(PROBLEM.frames[0], ())
     (finer,) = {cause for cause, _ in tried}
     fits = {drift: iter([400.0]), finer: iter([390.0, left, 385.0, left])}  # begun in three ways, and settled
     for module in (exchange, acceptance):
@@ -1222,7 +1222,9 @@ def test_what_speaks_against_a_cause_is_written_beside_it(
 def test_what_only_imitates_a_force_by_speed_predicts_little(monkeypatch, name, left, gain, doubted):
     """Five of five false ones of 120 blind cases predicted at most 0.7, true ones 0.89 and more."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
-    current = replace(_fit(left), terms=(Term(CAUSE[name], (0.02, 0.01)[: len(CAUSE[name].parameters)]),))
+    current = replace(
+        _fit(left), terms=(Term(CAUSE[name], (0.02, 0.01)[: len(CAUSE[name].quantities(PROBLEM.frames[0]))]),)
+    )
     state = _state(
         current,
         without={name: _fit(800.0)},

@@ -632,7 +632,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
         ("t,u,y\n0,1,2\n1,2\n", ["2 columns in line 3", "expected 3"]),
         ("t,u\n0,1\n1,2,3\n", ["3 columns in line 3", "expected 2"]),
         ("t,u\n0,1,2\n1,2,3\n", ["2 column names", "3 columns in line 2"]),
-        ("t,u\n0,1\n1,2\n3\n", ["1 column in line 4", "1 of 3 rows lacks a number"]),
+        ("t,u\n0,1\n1,2\n3\n", ["1 column in line 4", "1 of 3 rows is bad"]),
         (
             "t;u\n0;1,5\n1;2.5\n",
             ["mixes decimal signs", "'2.5' in column u, line 3", "'1,5' in column u, line 2"],
@@ -923,9 +923,9 @@ def test_time_that_does_not_increase_is_told_as_the_file_has_it(table, rows, aft
         ((100, 110, 120, 130, 140, 150, 160, 170, 120, 130), "winter time: add an hour"),
         ((100, 110, 120, 130, 140, 150, 120, 130), "offset from UTC"),  # two rows are missing
         ((0, 60, 120, 120, 180, 240), "winter time"),
-        ((100, 110, 120, 130, 140, 150, 160, 170, 160, 180), "sort the rows"),
+        ((100, 110, 120, 130, 140, 150, 160, 170, 160, 180), "sort them"),
         ((100, 110, 120, 130, 130, 140), "more digits"),
-        ((200, 210, 220, 230, 240, 250, 100, 110), "sort the rows"),
+        ((200, 210, 220, 230, 240, 250, 100, 110), "sort them"),
     ],
 )
 def test_a_clock_that_was_set_back_for_winter_time_is_no_table_to_sort(table, minutes, todo):
@@ -1002,7 +1002,7 @@ def test_a_column_is_found_with_its_unit_written_otherwise(tmp_path):
     ("name", "hint"),
     [
         ("zzzz.csv", "files in {}: a.csv"),
-        ("zzzz", "check the name, or give the full path: no file in {} has a similar one"),
+        ("zzzz", "check the name, or give the full path: no file in {} has a similar name"),
     ],
 )
 def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hint):

@@ -33,6 +33,8 @@ _WITHIN_STROKE = (0.02, 0.5)  # ranges that the input moves in a time: a level o
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
 _LEVELS = 48  # of a hysteresis that fills in what the readings leave open
 _UNEVEN = 0.5  # of a time step: two columns of one table may be read so far apart
+_STEPPED = 30.0  # time steps: to a longer lag it does not matter what is between two samples ...
+_BETWEEN = (0.7, -0.7)  # ... and what is tried for a shorter one: nearly the later sample, nearly the earlier
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
@@ -53,6 +55,7 @@ class Quantity:
     high: float
     small: float  # a step that matters little: for differences
     meaning: str = ""  # what it is, in words; {input} and {output} are what was measured
+    whole: bool = False  # nothing lies beyond its bounds: an end of them is an answer like any other
 
 
 @dataclass
@@ -133,10 +136,10 @@ class Frame:
         if self.past is not None:
             self.past.after[name] = values
 
-    def low_pass(self, x: FloatArray, tau_s: float, name: str) -> FloatArray:
+    def low_pass(self, x: FloatArray, tau_s: float, name: str, between: float = 0.0) -> FloatArray:
         """Return x (n,) behind a lag, going on from where the piece before, of the same name, ended."""
         last = self.remembered(f"lag {name}", np.repeat(x[:1], 2))
-        filtered = low_pass(x, tau_s, self.dt_s, last)
+        filtered = low_pass(x, tau_s, self.dt_s, last, between)
         self.remember(f"lag {name}", np.asarray([x[-1], filtered[-1]]))
         return filtered
 
@@ -215,8 +218,8 @@ class Cause:
         """Return the causes of this id that records may tell apart: what a formula leaves open."""
         return (self,)
 
-    def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
-        """The same with one more parameter, and values of it to begin with: for records that show it."""
+    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
+        """The same with one more parameter, and values of it to begin with, for records that show it."""
         return []
 
     def coarser(self) -> Cause | None:
@@ -346,6 +349,49 @@ class Late(OneTime):
     common = True
 
 
+class FirstOrder(Late):
+    """A first-order lag; what it sees between two samples is a parameter of the finer formula.
+
+    A table does not say whether an amplifier held the input or ramped it. To a lag of few time steps that is
+    half a step, which would be taken for another cause, such as a force by speed (decision 148).
+    """
+
+    parameters = (
+        Quantity("tau", "s", 0.0, 0.5, 0.0005),
+        Quantity(
+            "between",
+            "1",
+            -1.0,
+            1.0,
+            0.02,
+            "what it sees between two samples: 0 a straight line, 1 the later sample, -1 the earlier one",
+            whole=True,
+        ),
+    )
+
+    def __init__(self, *, is_finer: bool = False) -> None:
+        self._is_finer = is_finer
+
+    def as_fine_as(self, other: FirstOrder) -> FirstOrder:
+        """Return the same with as many parameters as another has."""
+        return type(self)(is_finer=other._is_finer)
+
+    def coarser(self) -> Cause | None:
+        return type(self)() if self._is_finer else None
+
+    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
+        if self._is_finer or frame.averaged > 1 or values[0] > _STEPPED * frame.dt_s:
+            return []
+        return [(type(self)(is_finer=True), between) for between in _BETWEEN]
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        return type(self)(is_finer=len(values) > 1), values
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        time, between = self.parameters
+        return (*sampled((time,), frame), *([between] if self._is_finer else []))
+
+
 class RecordedLate(OneTime):
     """A fault by which the input is recorded late: no device answers before it is asked."""
 
@@ -406,17 +452,22 @@ def spread(low: float, high: float, ratio: float) -> list[float]:
     return [float(one) for one in np.geomspace(low, high, count)]
 
 
-def low_pass(x: FloatArray, tau_s: float, dt_s: float, last: FloatArray | None = None) -> FloatArray:
+def low_pass(
+    x: FloatArray, tau_s: float, dt_s: float, last: FloatArray | None = None, between: float = 0.0
+) -> FloatArray:
     """Solve tau x' + x = input for an input that is straight between samples, from rest at x[0].
 
-    ``last`` (2,) is the last input and output before, where it does not begin at rest.
+    ``last`` (2,) is the last input and output before, where it does not begin at rest. ``between`` is what
+    the input is between two samples: 0 straight, 1 the later one, -1 the earlier one.
 
-    Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
+    Exact: y+ = a y + (1 - a) u + b (u+ - u) with a = exp(-dt/tau) and b = 1 - (tau/dt)(1 - a) of a straight
+    input, 1 - a of one that is the later sample, 0 of one that is the earlier one.
     """
     if tau_s <= _NO_LAG * dt_s:
         return x
     a = np.exp(-dt_s / tau_s)
     slope = 1.0 - tau_s / dt_s * (1.0 - a)
+    slope += max(between, 0.0) * (1.0 - a - slope) + min(between, 0.0) * slope
     b = np.asarray([slope, 1.0 - a - slope])
     # the filter's first step must see the first value as its past
     last_in, last_out = np.repeat(x[:1], 2) if last is None else last

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import FirstOrder, Frame, Quantity, Values
 
 
-class FieldLag(Late):
+class FieldLag(FirstOrder):
     """A first-order lag before the hysteresis."""
 
     id = "field-lag"
@@ -17,7 +17,10 @@ class FieldLag(Late):
     source = "Bertotti, Hysteresis in Magnetism, 1998, chapter 12"
     stage = "input"
     order = 20
-    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),)
+    parameters = (
+        Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),
+        *FirstOrder.parameters[1:],
+    )
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return frame.low_pass(u, values[0], self.id)
+        return frame.low_pass(u, values[0], self.id, *values[1:])

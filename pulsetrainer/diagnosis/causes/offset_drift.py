@@ -78,7 +78,7 @@ class OffsetDrift(Cause):
         """The same that is a parabola."""
         return OffsetDrift() if self.relaxing is self else None
 
-    def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
+    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
         """The same that relaxes, or grows."""
         if self.relaxing is self:
             return []

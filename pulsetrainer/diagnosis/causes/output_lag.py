@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import FirstOrder, Frame, Quantity, Values
 
 
-class OutputLag(Late):
+class OutputLag(FirstOrder):
     """A first-order lag after the hysteresis."""
 
     id = "output-lag"
@@ -22,7 +22,10 @@ class OutputLag(Late):
     stage = "output"
     order = 100
     in_rows = True
-    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),)
+    parameters = (
+        Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),
+        *FirstOrder.parameters[1:],
+    )
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return np.apply_along_axis(frame.low_pass, 0, y, values[0], self.id)
+        return np.apply_along_axis(frame.low_pass, 0, y, values[0], self.id, *values[1:])

@@ -71,7 +71,7 @@ class ThermalDrift(OfKinds):
             return ThermalDrift(*kind), own
         return ThermalDrift(values[0], moves_zero=True), values[1:]
 
-    def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
+    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
         """The same that moves the zero."""
         return [] if self.moves_zero else [(ThermalDrift(self.kind, moves_zero=True), 0.0)]
 

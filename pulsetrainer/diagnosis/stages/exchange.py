@@ -5,7 +5,9 @@ family, and every other kind of its own, is fitted in its place. The best is kep
 p-value of the old one: the test was whether anything of this family is there, not which one (decision 044).
 
 For a lag or a force by speed that is as fast as the samples a creep is tried as well, for such a creep the
-lags, and one creep in the place of several fast causes (decision 128).
+lags, and one creep in the place of several fast causes (decision 128). A lag of few time steps and a cause
+as fast as the samples may be that lag alone, seeing other than a straight line between two samples
+(decision 148).
 
 Some causes have a finer formula with one more parameter. It takes the place of the plain one only if the fits
 differ by more than twice what noise, and what happens between two samples, can make. The finer formula may be
@@ -17,10 +19,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.fast_causes import as_late
+from pulsetrainer.diagnosis.fast_causes import as_late, fast_s
 from pulsetrainer.diagnosis.finding import may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.noise import doubt
@@ -33,7 +35,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with each cause exchanged for a better one of its family, where there is one."""
-    state = _one_creep(state)
+    state = _one_lag(_one_creep(state))
     for cause in [term.cause for term in state.current.terms]:
         state = _exchanged(state, cause)
     for term in state.current.terms:
@@ -51,11 +53,20 @@ def _refined(state: State, term: Term) -> State:
         term = Term(coarser, term.values[:-1])
         plain, trials = refit(problem, (*others, term), current), [current]
     if coarser is None or coarser.id != old.id:
-        begun = [Term(one, (*term.values, value)) for one, value in term.cause.finer(problem.frames[0])]
+        begun = [
+            Term(one, (*term.values, value))
+            for one, value in term.cause.finer(problem.frames[0], term.values)
+        ]
         trials += [refit(problem, (*others, one), current) for one in begun]
     shown = [fine for fine in trials if _shows(state, fine, plain, _in_place_of(old, fine, current))]
     best = min(shown, key=lambda fitted: fitted.squares, default=plain)
     return state if best is current else _with(state, best, old)
+
+
+def _finer(state: State, term: Term) -> list[Term]:
+    """Return the finer formulas of a cause, as they begin."""
+    found = term.cause.finer(state.problem.frames[0], term.values)
+    return [Term(one, (*term.values, value)) for one, value in found]
 
 
 def _in_place_of(old: Cause, fitted: Fitted, current: Fitted) -> Cause:
@@ -93,6 +104,27 @@ def _one_creep(state: State) -> State:
         return state
     p_values = {name: p for name, p in state.p_values.items() if name in best.names}
     p_values[Creep.id] = min(state.p_values[term.cause.id] for term in several)
+    return replace(state, current=settled(state.problem, best), p_values=p_values)
+
+
+def _one_lag(state: State) -> State:
+    """Return the state with a lag that sees other than a straight line between two samples, for two causes.
+
+    The other one must be as fast as the samples, such as a force by speed, and the lag alone as good.
+    """
+    current, frame = state.current, state.problem.frames[0]
+    lags = [term for term in current.terms if isinstance(term.cause, FirstOrder)]
+    trials = [
+        refit(state.problem, (*(t for t in current.terms if t not in (term, other)), fine), current)
+        for term in lags
+        for other in current.terms
+        if other is not term and fast_s(other, frame) is not None
+        for fine in _finer(state, term)
+    ]
+    best = min(trials, key=lambda fitted: fitted.squares, default=None)
+    if best is None or best.squares - current.squares > doubt(current, best, state.scores.noise):
+        return state
+    p_values = {name: p for name, p in state.p_values.items() if name in best.names}
     return replace(state, current=settled(state.problem, best), p_values=p_values)
 
 

@@ -208,7 +208,7 @@ def _may_be_own_error(state: State, term: Term, fall: float) -> bool:
 def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
     """Whether an interval ends where the search did; zero is a natural end, and does not count."""
     return any(
-        end != 0 and np.isclose(one, end * state.scale.of_unit(bound.unit), atol=0.0)
+        end != 0 and not bound.whole and np.isclose(one, end * state.scale.of_unit(bound.unit), atol=0.0)
         for own, bound in zip(known, bounds, strict=False)
         for one, end in ((own.lower, bound.low), (own.upper, bound.high))
     )
