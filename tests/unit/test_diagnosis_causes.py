@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -17,8 +18,9 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
 from pulsetrainer.diagnosis.causes import condition_change, fired_on, library, outliers, rate_widening
-from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
+from pulsetrainer.diagnosis.causes.base import Frame, Past, low_pass, settled
 from pulsetrainer.diagnosis.causes.step import _split
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_beside_hum, noise_of, spacing_of
@@ -51,6 +53,55 @@ def test_lags_follow_a_ramp():
     np.testing.assert_allclose(CAUSE["field-lag"].on_input(T, T, (0.3,), _frame()), _lagged(0.3), atol=1e-12)
     assert low_pass(T, 1e-9, DT) is T
     assert low_pass(T, 2e-9, DT) is not T
+
+
+@pytest.mark.parametrize(("between", "seen"), [(1.0, 1), (-1.0, 0)])
+@pytest.mark.parametrize("name", ["output-lag", "field-lag"])
+def test_a_lag_may_see_the_later_or_the_earlier_sample(name, between, seen):
+    """Against many small steps through an input that stands still between two samples; parts go on."""
+    u, tau, fine = RNG.standard_normal(40).cumsum(), 3 * DT, 4000
+    slow = [u[0]]
+    for pair in pairwise(u):
+        y = slow[-1]
+        for _ in range(fine):
+            y += DT / fine / tau * (pair[seen] - y)
+        slow.append(y)
+
+    def behind(x: np.ndarray, past: Past) -> np.ndarray:
+        frame = replace(_frame(x), past=past)
+        cause = CAUSE[name]
+        through = cause.on_output if cause.stage == "output" else partial(cause.on_input, x)
+        return through(x, (tau, between), frame)
+
+    first, rest = behind(u[:17], past := Past()), behind(u[17:], past.next())
+    np.testing.assert_allclose([*first, *rest], slow, atol=1e-3)
+    np.testing.assert_allclose(behind(u, Past()), slow, atol=1e-3)
+    straight = behind(u, Past()) - low_pass(u, tau, DT)
+    assert np.abs(straight).max() > 0.05  # it matters
+
+
+def test_a_lag_keeps_what_it_sees_between_samples():
+    """A model keeps one value or two; a long lag, or an averaged record, has no finer formula."""
+    for name in ("output-lag", "field-lag"):
+        plain, frame = CAUSE[name], _frame()
+        (later, up), (earlier, down) = plain.finer(frame, (3 * DT,))
+        assert up > 0 > down
+        for fine in (later, earlier):
+            assert fine.finer(frame, (3 * DT, up)) == []
+            assert fine.coarser().quantities(frame) == plain.quantities(frame)
+            assert [one.name for one in fine.quantities(frame)] == ["tau", "between"]
+        assert plain.finer(frame, (60 * DT,)) == []
+        assert plain.finer(replace(frame, averaged=4), (3 * DT,)) == []
+        for values in [(0.3,), (0.3, -1.0)]:
+            again, kept = plain.restored(values)
+            assert (len(again.quantities(frame)), kept) == (len(values), values)
+
+
+def test_an_end_of_what_lies_between_two_samples_is_an_answer():
+    """Other ends of what was searched are told."""
+    fine, _ = CAUSE["output-lag"].restored((0.3, 1.0))
+    assert Term(fine, (0.3, 1.0)).at_bounds(_frame()) == [False, False]
+    assert Term(fine, (0.5, 1.0)).at_bounds(_frame()) == [True, False]
 
 
 def test_a_gain_drifts_evenly_about_empty_memory():

@@ -21,6 +21,7 @@ from dataclasses import replace
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder
 from pulsetrainer.diagnosis.causes.creep import Creep
+from pulsetrainer.diagnosis.causes.resonance import Resonance
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late, fast_s
 from pulsetrainer.diagnosis.finding import may_be_nothing
@@ -110,7 +111,7 @@ def _one_creep(state: State) -> State:
 def _one_lag(state: State) -> State:
     """Return the state with a lag that sees other than a straight line between two samples, for two causes.
 
-    The other one must be as fast as the samples, such as a force by speed, and the lag alone as good.
+    The other one is as fast as the samples, such as a force by speed, or rings. The lag must do as well.
     """
     current, frame = state.current, state.problem.frames[0]
     lags = [term for term in current.terms if isinstance(term.cause, FirstOrder)]
@@ -118,7 +119,7 @@ def _one_lag(state: State) -> State:
         refit(state.problem, (*(t for t in current.terms if t not in (term, other)), fine), current)
         for term in lags
         for other in current.terms
-        if other is not term and fast_s(other, frame) is not None
+        if other is not term and (fast_s(other, frame) is not None or isinstance(other.cause, Resonance))
         for fine in _finer(state, term)
     ]
     best = min(trials, key=lambda fitted: fitted.squares, default=None)

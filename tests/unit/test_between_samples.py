@@ -1,0 +1,69 @@
+"""A lag of few time steps, computed as a recorder or a simulation computes it from sample to sample."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from form_devices import play
+
+import pulsetrainer as pt
+
+STEP_S = 37.0
+
+
+def _input(rng: np.random.Generator) -> np.ndarray:
+    """Strokes that decay, then turns at random, at 150 and at 40 samples a stroke."""
+    turns = [0.0, *(side * 0.93**k for k in range(12) for side in (1, -1)), *rng.uniform(-1, 1, 16)]
+    strokes = [
+        np.linspace(a, b, max(4, int(abs(b - a) / 2 * samples)), endpoint=False)
+        for samples in (150, 40)
+        for a, b in pairwise(turns)
+    ]
+    return np.concatenate(strokes)
+
+
+def _behind(x: np.ndarray, steps: float, between: float) -> np.ndarray:
+    """A lag of ``steps`` time steps: the later sample, the earlier one, or a fine line between both."""
+    keeps, fine = np.exp(-1.0 / steps), 200
+    y = [x[0]]
+    for before, after in pairwise(x):
+        last = y[-1]
+        if between:
+            y.append(keeps * last + (1.0 - keeps) * (after if between > 0 else before))
+            continue
+        for k in range(fine):
+            last += (before + (k + 0.5) / fine * (after - before) - last) / (steps * fine + 0.5)
+        y.append(last)
+    return np.asarray(y)
+
+
+def _device(u: np.ndarray, rng: np.random.Generator, steps: float, between: float, *, after: bool) -> pt.Run:
+    """Sixty plays of random weights, the lag before or after them, noise of 0.2 %."""
+    radii, weights = np.linspace(0.0, 0.9, 60), rng.gamma(1.0, 1.0, 60)
+    seen = u if after else _behind(u, steps, between)
+    y = play(seen, radii) @ weights
+    y = _behind(y, steps, between) if after else y
+    y = (y - y.min()) / np.ptp(y) + rng.normal(0.0, 0.002, u.size)
+    return pt.Run(time_s=STEP_S * np.arange(u.size), input=u, output=y)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("between", [1, -1, 0])
+@pytest.mark.parametrize("after", [True, False])
+def test_the_lag_alone_is_found_and_its_interval_holds_it(after, between):
+    """A force by speed, or a resonance, stood beside it, and its interval lay half a time step away."""
+    seed = 148_000 + 10 * after + between
+    rng = np.random.default_rng(seed)
+    steps = rng.uniform(3.0, 9.0)
+    run = _device(_input(rng), rng, steps, between, after=after)
+    told = pt.diagnose(run, pt.identify(run))
+    found, *others = told.found
+    assert [one.cause for one in others if between or not one.doubts] == [], seed
+    assert (found.cause, told.verdict) == (("output-lag" if after else "field-lag"),) * 2, seed
+    tau, *more = found.parameters
+    assert tau.lower <= steps * STEP_S <= tau.upper, (seed, steps)
+    assert tau.upper - tau.lower < 0.1 * tau.value
+    assert [one.lower <= between <= one.upper for one in more] == [True] * abs(between)
+    assert told.extended_percent < 1.15 * told.noise_percent
