@@ -124,6 +124,8 @@ may be wear: here a gain that wears off, with time or with the distance that the
 settles: something that settles from the start of the recording would look like it, and that is not sudden
 one stretch: nearly all that it explains lies in one short stretch of the recording, and a step changes all
     that comes after: it is neither added nor taken out
+rate changes: the {input} changes its speed at that moment, and what another cause lacks of a dependence on
+    speed would look like it: it is neither added nor taken out
 wanders: what is left still wanders, so it may be part of that: it is neither added nor taken out
 predicts little: on parts of the recordings that were left out it explains less than half of what could be
     explained, as any cause may if the model cannot follow a device of this kind

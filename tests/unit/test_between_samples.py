@@ -67,3 +67,22 @@ def test_the_lag_alone_is_found_and_its_interval_holds_it(after, between):
     assert tau.upper - tau.lower < 0.1 * tau.value
     assert [one.lower <= between <= one.upper for one in more] == [True] * abs(between)
     assert told.extended_percent < 1.15 * told.noise_percent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("filtered", [0.0, 2.5])
+def test_a_force_by_speed_around_each_sample_is_found_alone(filtered):
+    """By central differences half of the force of a turn comes a sample early; the other half was left."""
+    seed = 148_900 + round(filtered)
+    rng = np.random.default_rng(seed)
+    u = _input(rng)
+    speed = _behind(np.gradient(u), filtered, 0) if filtered else np.gradient(u)
+    y = play(u, np.linspace(0.0, 0.9, 60)) @ rng.gamma(1.0, 1.0, 60)
+    y = (y - y.min()) / np.ptp(y) + rng.uniform(1.0, 2.0) * speed + rng.normal(0.0, 0.002, u.size)
+    run = pt.Run(time_s=STEP_S * np.arange(u.size), input=u, output=y)
+    told = pt.diagnose(run, pt.identify(run))
+    found, *others = told.found
+    assert (found.cause, others, told.verdict) == ("viscous", [], "viscous"), seed
+    between = [one.value for one in found.parameters if one.name == "between"]
+    assert between == ([] if filtered else [pytest.approx(0.5, abs=0.2)])  # behind a filter it is no matter
+    assert told.left.whole, told.left

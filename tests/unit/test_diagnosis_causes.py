@@ -255,6 +255,38 @@ def test_a_widening_trails_by_the_root_of_the_rate():
     assert cause.on_input(T, T, (7e-9,), _frame()) is not T
 
 
+def test_a_force_may_follow_the_speed_after_a_sample_or_around_it():
+    """A recorder, or a simulation by central differences, has it so; a model keeps it beside the power."""
+    u, y = RNG.standard_normal(T.size).cumsum(), np.sin(T)
+    for kind in CAUSE["viscous"].kinds():
+        ((fine, half),) = kind.finer(_frame(), (0.3, 0.0))
+        assert fine.finer(_frame(), (0.3, 0.0, half)) == []
+        assert fine.coarser().kind == fine.kind == kind.kind
+        slope = {0.0: np.diff(u, prepend=u[0]), 0.5: np.gradient(u), 1.0: np.diff(u, append=u[-1])}
+        for between, speed in slope.items():
+            shown = fine.on_output(y, (0.3, 0.0, between), _frame(u))
+            expected = y + 0.3 * np.sign(speed) * np.abs(speed / DT) ** kind.kind
+            np.testing.assert_allclose(shown[1:-1], expected[1:-1], rtol=1e-9)
+        kept = tuple(value for _, value, _ in fine.constants())
+        again, values = CAUSE["viscous"].restored((*kept, 0.3, 0.1, half))
+        assert (again.kind, values, len(again.quantities(_frame()))) == (kind.kind, (0.3, 0.1, half), 3)
+        assert kind.finer(_frame(), (0.3, 60 * DT)) == []
+        assert kind.finer(replace(_frame(), averaged=2), (0.3, 0.0)) == []
+
+
+@pytest.mark.parametrize(
+    ("faster", "at", "changes"), [(3.0, 2.0, True), (1.2, 2.0, False), (3.0, 1.5, False)]
+)
+def test_a_change_of_rate_is_at_a_moment_or_elsewhere(faster, at, changes):
+    """Rests between strokes are no rate; the moment is known to a fiftieth of the record."""
+    t = np.arange(0.0, 4.0, DT / 5)
+    way = np.where(t < 2.0, t, 2.0 + faster * (t - 2.0))
+    u = np.abs((way * 12.0) % 2.0 - 1.0)
+    u[t % 0.4 < 0.1] = 0.3
+    frame = Frame(DT / 5, u, 1.0, 1.0)
+    assert frame.changes_rate(at) is changes
+
+
 def test_simple_formulas():
     """Delay, viscous force, drift, sine, skew, change of condition: each as it is written."""
     y = np.sin(T)

@@ -2812,6 +2812,22 @@ def test_a_step_of_a_certain_size_is_none_whose_weights_hide_it_elsewhere(monkey
     assert (rivals.ONE_STRETCH in told) is doubted
 
 
+@pytest.mark.parametrize(
+    ("changes", "names", "doubted"),
+    [
+        (True, ("step", "creep"), True),
+        (True, ("step",), False),
+        (True, ("step", "offset-drift"), False),
+        (False, ("step", "creep"), False),
+    ],
+)
+def test_a_step_where_the_rate_changes_beside_a_cause_of_the_device(monkeypatch, changes, names, doubted):
+    """Thresholds that grow with the rate left a step of 4 % where the loops became faster."""
+    monkeypatch.setattr(Frame, "changes_rate", lambda self, time_s: changes)
+    state = _state(_fit(1.0, *names))
+    assert rivals._where_the_rate_changes(state, state.current.terms[0]) is doubted
+
+
 def test_the_shortest_stretch_that_holds_a_share():
     """To a hundredth of all; the whole where no stretch holds so much."""
     values = np.zeros(1000)

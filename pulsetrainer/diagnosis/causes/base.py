@@ -31,9 +31,14 @@ if TYPE_CHECKING:
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _WITHIN_STROKE = (0.02, 0.5)  # ranges that the input moves in a time: a level of the plane; a long stroke
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
+_NEAR = 0.02  # of a record: a change of rate so near to a moment is at that moment ...
+_SIDE = 0.05  # ... if on so much of the record before and after it ...
+_MOVES = 0.2  # ... of which the input moves in this share at least ...
+_FASTER = 1.5  # ... it moves so many times as fast; ...
+_LOOKS = 20  # ... looked for at so many places to either side
 _LEVELS = 48  # of a hysteresis that fills in what the readings leave open
-_UNEVEN = 0.5  # of a time step: two columns of one table may be read so far apart
-_STEPPED = 30.0  # time steps: to a longer lag it does not matter what is between two samples ...
+_UNEVEN = 0.75  # of a time step: two columns may be read half a step apart, and an input be held besides
+STEPPED = 30.0  # time steps: to a longer lag it does not matter what is between two samples ...
 _BETWEEN = (0.7, -0.7)  # ... and what is tried for a shorter one: nearly the later sample, nearly the earlier
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
@@ -115,6 +120,22 @@ class Frame:
         """Whether the input moves, on average, by more than a level in such a time, but within one stroke."""
         ranges = float(self.path[-1]) / self.reach * time_s / (self.input.size * self.dt_s)
         return _WITHIN_STROKE[0] < ranges < _WITHIN_STROKE[1]
+
+    def changes_rate(self, time_s: float) -> bool:
+        """Whether the input moves at another speed after a time since its first sample than before it."""
+        count, near = self.input.size, round(_NEAR * self.input.size)
+        at, side = round(time_s / self.dt_s), round(_SIDE * self.input.size)
+        speed = np.abs(np.diff(self.input)) / self.reach
+        for turn in range(max(at - near, side), min(at + near, count - side), max(near // _LOOKS, 1)):
+            sides = [
+                part[part > _NO_PATH * self.dt_s / self.length_s]
+                for part in (speed[turn - side : turn], speed[turn : turn + side])
+            ]
+            if all(part.size >= _MOVES * side for part in sides):
+                one, other = (float(np.median(part)) for part in sides)
+                if max(one, other) > _FASTER * min(one, other):
+                    return True
+        return False
 
     def about(self, zero: float) -> Frame:
         """Return the frame with another zero of the output; the path is followed once for all of them."""
@@ -380,7 +401,7 @@ class FirstOrder(Late):
         return type(self)() if self._is_finer else None
 
     def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
-        if self._is_finer or frame.averaged > 1 or values[0] > _STEPPED * frame.dt_s:
+        if self._is_finer or frame.averaged > 1 or values[0] > STEPPED * frame.dt_s:
             return []
         return [(type(self)(is_finer=True), between) for between in _BETWEEN]
 

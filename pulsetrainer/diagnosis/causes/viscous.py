@@ -2,7 +2,8 @@
 
 The part may be proportional to the speed, as in a fluid (p = 1), to its root, as excess losses are (1/2), or
 to its square, as at an orifice (2). Each power is tried. Where the input has one speed all powers are alike,
-and only the first is.
+and only the first is. A recorder, or a simulation, may take the speed after a sample, or around it: that is a
+parameter of the finer formula (decision 148).
 """
 
 from __future__ import annotations
@@ -13,7 +14,16 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, low_pass, sampled
+from pulsetrainer.diagnosis.causes.base import (
+    STEPPED,
+    Cause,
+    Frame,
+    OfKinds,
+    Quantity,
+    Values,
+    low_pass,
+    sampled,
+)
 
 _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
@@ -25,6 +35,8 @@ _ONE_SPEED = 1.5  # ... where the latter take less than so many times as long, t
 _LINEAR = 1.0  # power of the speed ...
 _ROOT = 0.5  # ... or this ...
 _SQUARE = 2.0  # ... or this
+_AROUND = 0.5  # the speed before a sample and that after it have as much each
+_PLAIN = 2  # parameters of the formula that takes the speed before a sample
 
 
 class Viscous(OfKinds):
@@ -50,19 +62,46 @@ class Viscous(OfKinds):
             "coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5, "{output} per speed of the {input}, to its power"
         ),
         Quantity("filter", "s", 0.0, 0.05, 1e-4, "time by which it trails the speed"),
+        Quantity(
+            "between",
+            "1",
+            0.0,
+            1.0,
+            0.02,
+            "where it takes the speed: 0 before each sample, 1 after it, 0.5 around it",
+            whole=True,
+        ),
     )
 
+    def __init__(self, kind: float | None = None, *, is_finer: bool = False) -> None:
+        super().__init__(kind)
+        self._is_finer = is_finer
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        return ((self.number, self.kind, "1"),) if self._is_finer else super().constants()
+
+    def coarser(self) -> Cause | None:
+        return Viscous(self.kind) if self._is_finer else None
+
+    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
+        if self._is_finer or frame.averaged > 1 or values[1] > STEPPED * frame.dt_s:
+            return []
+        return [(Viscous(self.kind, is_finer=True), _AROUND)]
+
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        coefficient, trailing = self.parameters
+        coefficient, trailing, between = self.parameters
         unit = coefficient.unit if self.kind == _LINEAR else f"{{y}} (s/{{u}})^{self.kind:g}"
-        return replace(coefficient, unit=unit), *sampled((trailing,), frame)
+        return replace(coefficient, unit=unit), *sampled((trailing,), frame), *[between] * self._is_finer
 
     def kinds(self, frames: Sequence[Frame] = ()) -> tuple[Cause, ...]:
         return (self,) if frames and _have_one_speed(frames) else super().kinds()
 
     def restored(self, values: Values) -> tuple[Cause, Values]:
         """Return the cause and its parameters; models were once kept without the filter."""
-        return super().restored(values if len(values) > 1 else (*values, 0.0))
+        own = values if len(values) > 1 else (*values, 0.0)
+        is_finer = len(own) > 1 + _PLAIN
+        count = _PLAIN + is_finer
+        return Viscous(*own[:-count], is_finer=is_finer), own[-count:]
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         speed = max(float(np.std(np.gradient(f.input, f.dt_s))) for f in frames)
@@ -74,6 +113,8 @@ class Viscous(OfKinds):
         before = frame.remembered(self.id, frame.input[:1])
         frame.remember(self.id, frame.input[-1:])
         speed = np.diff(frame.input, prepend=before) / frame.dt_s
+        for after in values[_PLAIN:]:
+            speed = (1.0 - after) * speed + after * np.append(speed[1:], speed[-1:])
         return y + values[0] * frame.low_pass(self._power(speed), values[1], self.id)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:

@@ -16,15 +16,18 @@ another cause: a drift of the gain holds one of the zero.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
 from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.causes.resonance import Resonance
+from pulsetrainer.diagnosis.causes.viscous import Viscous
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late, fast_s
-from pulsetrainer.diagnosis.finding import may_be_nothing
+from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.noise import doubt
 from pulsetrainer.diagnosis.screening import in_place, ranked
@@ -81,7 +84,13 @@ def _shows(state: State, fine: Fitted, plain: Fitted, cause: Cause) -> bool:
     if noise is None or plain.squares - fine.squares <= LIMITS.finer * doubt(fine, plain, noise):
         return False
     known = estimates_of(fine, state.scores, state.held_out, state.floor)[cause.id]
-    return not may_be_nothing(cause.strengths_of(known))
+    return not may_be_nothing(cause.strengths_of(known)) and _is_told(state, known, cause)
+
+
+def _is_told(state: State, known: Sequence[Estimate], cause: Cause) -> bool:
+    """Whether the interval of what lies between two samples excludes that of the plain formula, zero."""
+    last = cause.quantities(state.problem.frames[0])[-1]
+    return not (last.whole and known[-1].lower <= 0.0 <= known[-1].upper)
 
 
 def _with(state: State, best: Fitted, old: Cause) -> State:
@@ -109,22 +118,27 @@ def _one_creep(state: State) -> State:
 
 
 def _one_lag(state: State) -> State:
-    """Return the state with a lag that sees other than a straight line between two samples, for two causes.
+    """Return the state with one cause for two, where what it sees between two samples explains the other.
 
-    The other one is as fast as the samples, such as a force by speed, or rings. The lag must do as well.
+    The other is as fast as the samples, such as a force by speed, or rings. The one must do as well alone.
     """
-    current, frame = state.current, state.problem.frames[0]
-    lags = [term for term in current.terms if isinstance(term.cause, FirstOrder)]
-    trials = [
-        refit(state.problem, (*(t for t in current.terms if t not in (term, other)), fine), current)
-        for term in lags
-        for other in current.terms
-        if other is not term and (fast_s(other, frame) is not None or isinstance(other.cause, Resonance))
-        for fine in _finer(state, term)
-    ]
-    best = min(trials, key=lambda fitted: fitted.squares, default=None)
-    if best is None or best.squares - current.squares > doubt(current, best, state.scores.noise):
+    current, frame, noise = state.current, state.problem.frames[0], state.scores.noise
+    fast = [t for t in current.terms if fast_s(t, frame) is not None or isinstance(t.cause, Resonance)]
+    as_good = []
+    for term, other in product(current.terms, fast):
+        if other is term or not isinstance(term.cause, FirstOrder | Viscous):
+            continue
+        kept = tuple(one for one in current.terms if one not in (term, other))
+        for fine in _finer(state, term):
+            trial = refit(state.problem, (*kept, fine), current)
+            if trial.squares - current.squares > doubt(current, trial, noise):
+                continue
+            cause = _in_place_of(term.cause, trial, current)
+            known = estimates_of(trial, state.scores, state.held_out, state.floor)[cause.id]
+            as_good += [trial] if _is_told(state, known, cause) else []
+    if not as_good:
         return state
+    best = min(as_good, key=lambda fitted: fitted.squares)
     p_values = {name: p for name, p in state.p_values.items() if name in best.names}
     return replace(state, current=settled(state.problem, best), p_values=p_values)
 

@@ -20,6 +20,8 @@ What speaks against a cause that was found is written beside it:
   lowered on blocks that were left out: in a device of another kind they would do as much;
 - it is sudden, its size is uncertain, and nearly all that it takes away lies in one stretch, much shorter
   than the time before and after it: a step changes all that comes after;
+- it is sudden, and where the input changes its speed, beside a cause of the device that depends on time: what
+  the formula of that one lacks looks like it;
 - it follows the speed, like anything that a device does as it moves; more than the noise from sample to
   sample is left, and of what the model leaves without it less than three quarters is predicted on blocks left
   out;
@@ -58,7 +60,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, LEAVES_MORE = "own error", "strength at bound", "leaves more"
 MAY_BE_NOTHING, SETTLES, IN_STEP = "spans zero", "settles", "in step"
-IMITATES, ONE_STRETCH = "imitates", "one stretch"
+IMITATES, ONE_STRETCH, RATE_CHANGES = "imitates", "one stretch", "rate changes"
 
 
 def stage(state: State) -> State:
@@ -146,8 +148,18 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     sizes = term.cause.strengths_of(state.estimates[term.cause.id]) if term.cause.sudden else ()
     if sizes and all(_is_rough(one) for one in sizes) and _in_one_stretch(state, term):
         yield ONE_STRETCH
+    if term.cause.sudden and _where_the_rate_changes(state, term):
+        yield RATE_CHANGES
     if wear.is_as_good(state, term):
         yield SETTLES if term.cause.sudden else MAY_BE_WEAR
+
+
+def _where_the_rate_changes(state: State, term: Term) -> bool:
+    """Whether a sudden cause is where the input changes its speed, beside one that depends on time."""
+    lasting = any(one.cause.lasting and not one.cause.sudden for one in state.current.terms)
+    moment = term.values[-1]
+    frames = [one for one in state.problem.frames if one.begin_s <= moment]
+    return lasting and bool(frames) and frames[-1].changes_rate(moment - frames[-1].begin_s)
 
 
 def _is_rough(size: Estimate) -> bool:
