@@ -86,3 +86,20 @@ def test_a_force_by_speed_around_each_sample_is_found_alone(filtered):
     between = [one.value for one in found.parameters if one.name == "between"]
     assert between == ([] if filtered else [pytest.approx(0.5, abs=0.2)])  # behind a filter it is no matter
     assert told.left.whole, told.left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("between", [1, 0])
+def test_the_interval_of_a_slow_recorder_holds_digital_filters_too(between):
+    """One that goes from sample to sample is told half a time step shorter, and was outside in 2 of 2."""
+    seed = 148_700 + between
+    rng = np.random.default_rng(seed)
+    u, steps = _input(rng), rng.uniform(4.0, 8.0)
+    y = play(u, np.linspace(0.0, 0.9, 60)) @ rng.gamma(1.0, 1.0, 60)
+    y = (y - y.min()) / np.ptp(y) + rng.normal(0.0, 0.002, u.size)
+    run = pt.Run(time_s=STEP_S * np.arange(u.size), input=_behind(u, steps, between), output=y)
+    told = pt.diagnose(run, pt.identify(run))
+    assert told.verdict == "input-lag", seed
+    (tau,) = told.found[0].parameters
+    assert tau.lower <= steps * STEP_S <= tau.upper, (seed, steps)
+    assert tau.upper - tau.lower < 2.5 * STEP_S

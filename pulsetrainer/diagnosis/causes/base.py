@@ -343,6 +343,10 @@ class Cause:
         """Input (n,) without a fault of its measurement."""
         return u
 
+    def alternatives(self) -> tuple[Cause, ...]:
+        """Return causes of the same parameters whose formulas are as plausible as its own: for intervals."""
+        return ()
+
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
         return []

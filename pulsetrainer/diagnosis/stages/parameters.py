@@ -7,7 +7,8 @@ which also sees what the fitted model misses. Three errors are added to it, as i
 - the error of the levels, as if a fifth of it were aligned with the parameter;
 - the effect of a fifth of a sample step, since input and output are not read at the same moment: each has its
   filter, and converters are read in turn;
-- how far other formulas, as plausible as those of the library, move the estimate (``Cause.variants``).
+- how far other formulas, as plausible as those of the library, move the estimate (``Cause.variants``,
+  ``Cause.alternatives``).
 
 The interval of the moment of a sudden change holds all moments that fit as well (``moments``). A cause that
 equal loops show has the interval of those loops.
@@ -20,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.extended import shown_output
+from pulsetrainer.diagnosis.extended import Term, shown_output
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
@@ -84,6 +85,11 @@ def _otherwise(fitted: Fitted) -> list[FloatArray]:
     inner, frames = fitted.simulator.inner(fitted.terms), fitted.simulator.frames
     found = []
     for k, term in enumerate(fitted.terms):
+        for cause in term.cause.alternatives():
+            terms = (*fitted.terms[:k], Term(cause, term.values), *fitted.terms[k + 1 :])
+            both = zip(fitted.simulator.full(terms), fitted.simulator.full(fitted.terms), strict=True)
+            changes = fitted.design.bins.average([other - own for other, own in both])
+            found.append(fitted.projector(changes[:, None])[:, 0])
         if term.cause.stage != "output":
             continue
         before = [shown_output(fitted.terms[:k], y, frame) for y, frame in zip(inner, frames, strict=True)]
