@@ -111,9 +111,10 @@ def _oracle_share(case, answer: State) -> float:
     terms = []
     for name, truth in case.truth.items():
         cause = library()[name]
-        if cause.stage == "record" or any(q.name not in truth for q in cause.parameters):
+        asked = cause.quantities(answer.problem.frames[0])  # of the plain formula
+        if cause.stage == "record" or any(q.name not in truth for q in asked):
             return float("nan")
-        values = (truth[q.name] / answer.scale.of_unit(q.unit) for q in cause.parameters)
+        values = (truth[q.name] / answer.scale.of_unit(q.unit) for q in asked)
         terms.append(Term(cause, tuple(values)))
     if not terms or answer.current is answer.baseline:
         return float("nan") if not terms else 0.0

@@ -107,6 +107,7 @@ def test_another_firmware_names_both_versions_and_who_is_older(folder, firmware,
     refused(folder, port, name, theirs=f"firmware {version}", ours="this program's firmware 0.")
 
 
+@pytest.mark.slow
 def test_a_device_that_is_not_ours(folder):
     """Something talks behind the port, but not our protocol."""
     ours, theirs = os.openpty()
@@ -167,6 +168,7 @@ def test_a_host_that_is_stopped_finds_the_device_off(folder):
     kept(folder, 100)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the device's process in /proc")
 def test_a_computer_that_falls_asleep_is_no_silent_host(folder):
     """Host and emulated device asleep for a second, the device awake first: it waits, nothing is lost."""
@@ -196,6 +198,7 @@ def test_a_computer_that_falls_asleep_is_no_silent_host(folder):
         assert file["time"][-1] > 119
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "what", ["force-high", "current-rail", "force-frozen", "tick-overrun", "reset", "hang"]
 )
@@ -268,6 +271,7 @@ def test_losses_on_a_bad_wire_are_in_the_file(folder):
     assert shown["facts"]["dropped_samples"] == dropped
 
 
+@pytest.mark.slow
 def test_a_stranger_that_holds_the_port_open_is_no_hang(folder):
     """Nobody behind the port: an answer within seconds."""
     ours, theirs = os.openpty()

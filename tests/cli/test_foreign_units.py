@@ -34,6 +34,7 @@ def inverted(folder, table, columns):
     return done.json, drive.json, drive.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", BENCHES)
 def test_a_model_in_other_units_is_inverted(tmp_path, bench):
     """No limit that nobody asked for: nothing but rounding is left where an exact inverse exists."""

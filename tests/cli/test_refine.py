@@ -95,6 +95,7 @@ def test_what_is_learnt_stays_below_the_limit_in_force(tmp_path):
     assert pt.load(tmp_path / "out.h5").compensated.max() <= limit
 
 
+@pytest.mark.slow
 def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
     """A refined drive gives its share: the error of another pulse, noise included, falls by a third."""
     port, model = ("--port", "bench:"), ("--model", KEPT / "model.h5")

@@ -221,6 +221,7 @@ def test_a_pipe_gets_whole_lines_without_blanks_at_their_ends(tmp_path):
     assert "…" not in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_a_name_that_the_terminal_cannot_spell_is_no_error(tmp_path, encoding):
     """Escapes for a person; the JSON is the same everywhere."""

@@ -54,6 +54,7 @@ def test_the_contract(run, tmp_path):
     assert "vary by" not in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -453,6 +454,7 @@ def test_keys_change_the_beats_and_stop(tmp_path):
     assert np.diff(beats.start_s).max() > 1.2  # the pause
 
 
+@pytest.mark.slow
 def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     """How much is over, in beats too, stands in it: a bar beside it drew into it, and never moved."""
     terminal = Terminal(tmp_path, *SHORT, "--beats", 30, port=FAST)
@@ -463,6 +465,7 @@ def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     assert "━".encode() not in terminal.seen
 
 
+@pytest.mark.slow
 def test_the_screen_says_when_no_finger_may_be_there(tmp_path):
     """The first stroke once, then each beat from its first one on, then rest: what a teacher goes by."""
     terminal = Terminal(tmp_path, *SHORT, "--beats", 4)
@@ -473,6 +476,7 @@ def test_the_screen_says_when_no_finger_may_be_there(tmp_path):
     assert changes == ["first stroke: no finger yet", "normal", "at rest"]
 
 
+@pytest.mark.slow
 def test_a_terminal_without_unicode_gets_bars_of_its_letters(tmp_path, monkeypatch):
     """Each block became an escape of six letters, and the lines ran over."""
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
@@ -482,6 +486,7 @@ def test_a_terminal_without_unicode_gets_bars_of_its_letters(tmp_path, monkeypat
     assert b"\\u" not in terminal.seen
 
 
+@pytest.mark.slow
 def test_a_key_that_was_taken_is_shown_and_goes_again(tmp_path):
     """Nothing said so until its beat came, and it was pressed again; 'x' stayed to the end."""
     words = ("--pulses", "normal,bifid", "--rate", 100, "--minutes", 10)
@@ -503,6 +508,7 @@ def test_a_key_that_was_taken_is_shown_and_goes_again(tmp_path):
     assert terminal.end() == 0
 
 
+@pytest.mark.slow
 def test_a_pause_does_not_eat_the_session(tmp_path):
     """As many beats as without, never more than 100 %; a key that changes nothing is answered."""
     terminal = Terminal(tmp_path, *SHORT, "--minutes", 0.5, port=FAST)
@@ -586,6 +592,7 @@ def test_nothing_gives_a_question_away(tmp_path):
     assert np.isfinite(kept.quiz.response_s).all()
 
 
+@pytest.mark.slow
 def test_a_quiz_that_was_stopped_says_so(tmp_path, run):
     """On the screen, in the file, on the sheet: one answer of six is not all that was asked."""
     words = ("--pulses", "normal,bifid", "--quiz", 6, "--html", "s.html")
@@ -602,6 +609,7 @@ def test_a_quiz_that_was_stopped_says_so(tmp_path, run):
     assert run("evaluate", "s.h5", "--json").json["ended_early"] == said
 
 
+@pytest.mark.slow
 def test_a_session_that_was_interrupted_names_its_sheet(tmp_path):
     """It is written all the same."""
     terminal = Terminal(tmp_path, *SHORT, "--minutes", 5, "--html", "s.html", port=FAST, size=(24, 200))

@@ -100,6 +100,7 @@ def test_a_figure_needs_no_backend(there):
     assert cold(there, "plot", "model.h5", env=SURROUNDINGS["no such backend"]).code == 0
 
 
+@pytest.mark.slow
 def test_without_a_home_the_bench_is_compiled_for_the_one_command(there, tmp_path):
     """It plays, and nothing of it stays."""
     temporary = tmp_path / "temporary"

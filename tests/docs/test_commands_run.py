@@ -83,6 +83,7 @@ PAGES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)  # a page is a dozen commands; on a busy machine each takes its time
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_of_a_page_run(page, given, tmp_path):

@@ -207,6 +207,7 @@ def test_a_figure_of_the_readme_is_the_one_that_was_kept():
     assert demo.block(kept) not in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("page", "named", "most"), [("theory", "FIGURES", 60_000), ("measured", "MEASURED_FIGURES", 200_000)]
 )

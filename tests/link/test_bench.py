@@ -168,6 +168,7 @@ def test_a_compiler_that_fails_is_quoted(monkeypatch, tmp_path):
     assert list((tmp_path / "pulsetrainer" / "firmware").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_is_done_without(monkeypatch, tmp_path):
     """A file where the cache folder should be: compiled once for this process, where there is any room."""
     (tmp_path / "pulsetrainer").write_text("in the way", encoding="utf-8")

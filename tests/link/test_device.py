@@ -89,6 +89,7 @@ def test_firmware_that_does_not_tell_the_duty_is_told_apart(pulse):
         assert "2.2" in raised.value.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate_Hz", "decimation"), [(10_000, 1), (1000, 7), (250, 100), (2, 1000)])
 def test_rates_and_decimations(device, rate_Hz, decimation):
     """Any rate that divides the tick, any decimation: the ticks are where they should be."""

@@ -255,6 +255,7 @@ def seeds() -> list[object]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "seed"), seeds())
 def test_a_dry_run_ends_as_the_run_does(ready, tmp_path, command, seed):
     """The same exit code and kind of refusal; and it leaves the folder as it was."""
@@ -276,6 +277,7 @@ def test_a_dry_run_ends_as_the_run_does(ready, tmp_path, command, seed):
     assert verdict(dry) == verdict(run), (dry.err, run.err)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", ["--limit-force", "--limit-current"])
 @pytest.mark.parametrize(
     "words",

@@ -139,6 +139,7 @@ def test_an_armed_device_left_alone_disarms(wire):
     assert one.wait_for(State.FAULT).fault == Fault.HEARTBEAT
 
 
+@pytest.mark.slow
 def test_a_reference_that_stops_coming_is_an_underrun(wire):
     """The host lives but sends no samples: ramp to zero and fault, never hold the last value."""
     one = wire("bench:")

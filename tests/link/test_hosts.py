@@ -193,6 +193,7 @@ def test_no_device_is_opened_while_its_current_flows():
 # --- a wire that repeats ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeated", ["heartbeat", "status", "samples", "start"])
 def test_a_stuck_wire_does_not_keep_a_play_alive(wire, repeated):
     """One frame again and again, on the real firmware: it switches off within its heartbeat, and says why."""

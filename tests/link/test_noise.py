@@ -97,6 +97,7 @@ def clean():
         return device.play(_reference(), 1000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_minute_of_telemetry_through_a_bad_wire(clean, seed, capsys):
     """No sample that is not bit for bit that of the good wire; every lost one counted; played to its end."""

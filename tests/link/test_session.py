@@ -47,6 +47,7 @@ def test_a_program_killed_in_mid_upload_leaves_nothing_behind(wire):
     assert sum(b.count for b in one.telemetry) == 200
 
 
+@pytest.mark.slow
 def test_the_whole_firmware_under_the_sanitizers(wire):
     """Garbage, a play, a fault and a stop: neither address nor undefined-behaviour sanitizer has a word."""
     sanitized = firmware_executable(("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"))

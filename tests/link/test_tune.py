@@ -51,6 +51,7 @@ def test_gains_that_would_ring_are_not_tried():
     assert any("ring" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("port", "names"),
     [

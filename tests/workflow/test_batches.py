@@ -204,6 +204,7 @@ def _jobs(text: str) -> dict[str, int]:
     return {rule: int(n) for rule, n in re.findall(r"^(\w+) +(\d+)$", text, flags=re.MULTILINE)}
 
 
+@pytest.mark.slow
 def test_twenty_benches_are_planned(tmp_path):
     """The table that comes with the project: twenty devices, two pulses each."""
     table = ROOT / "workflow" / "devices.tsv"
