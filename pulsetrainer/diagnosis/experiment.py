@@ -17,8 +17,8 @@ from pulsetrainer.core.excitations import through
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.creep import Creep
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fast_causes import as_late, fast_s

@@ -19,8 +19,9 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes import cause_named
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Past, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.causes.delay import Delay
+from pulsetrainer.diagnosis.causes.frame import Frame, Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 

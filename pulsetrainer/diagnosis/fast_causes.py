@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late
+from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.causes.creep import Creep
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import Late
 from pulsetrainer.diagnosis.causes.viscous import Viscous
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.thresholds import LIMITS

@@ -21,7 +21,7 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, hysteresis, in_order, shown_output
 from pulsetrainer.diagnosis.problem import Problem

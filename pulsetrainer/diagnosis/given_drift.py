@@ -24,7 +24,8 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.causes.step import Step
 from pulsetrainer.diagnosis.evidence import Evidence

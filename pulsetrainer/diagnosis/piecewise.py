@@ -21,7 +21,7 @@ from pulsetrainer.core.memory import State, negative_saturation
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Past
+from pulsetrainer.diagnosis.causes.frame import Past
 from pulsetrainer.diagnosis.extended import Extended, chain
 from pulsetrainer.diagnosis.thresholds import LIMITS
 

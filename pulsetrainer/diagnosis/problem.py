@@ -10,7 +10,7 @@ import numpy as np
 
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record, counted, counted_output
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.design import Bins, Followed, bins_of
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.thresholds import LIMITS

@@ -30,7 +30,9 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder, Frame, Late, RecordedLate, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import FirstOrder, Late, RecordedLate
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in

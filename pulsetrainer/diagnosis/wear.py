@@ -16,7 +16,8 @@ from typing import ClassVar
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.causes.thermal_drift import ThermalDrift
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit

@@ -218,11 +218,11 @@ class Table:
 
 
 def _lacking(bad: int, rows: int) -> str:
-    return f"{bad} of {counted(rows, 'row')} {'lacks' if bad == 1 else 'lack'} a number"
+    return _share(bad, rows, "lacks a number", "lack a number")
 
 
-def _bad(bad: int, rows: int) -> str:
-    return f"{bad} of {counted(rows, 'row')} {'is' if bad == 1 else 'are'} bad"
+def _share(some: int, rows: int, is_so: str, are_so: str) -> str:
+    return f"{some} of {counted(rows, 'row')} {is_so if some == 1 else are_so}"
 
 
 def _alike(one: str, other: str) -> bool:
@@ -295,7 +295,7 @@ def read_table(
             )
         mend = rows.remedy or f"correct or remove {'that line' if bad.size == 1 else 'those lines'}"
         raise DataError(
-            f"{rows.misfit} ({_bad(bad.size, table.rows)}: {table.places(bad)})",
+            f"{rows.misfit} ({_share(bad.size, table.rows, 'is bad', 'are bad')}: {table.places(bad)})",
             hint=mend + (remedy and f", or {_AGAIN if table.mostly(bad) else remedy}"),
         )
     return table

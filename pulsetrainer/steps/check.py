@@ -17,7 +17,7 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
 from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import low_pass
+from pulsetrainer.diagnosis.causes.frame import low_pass
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.heat import rest_force, thermal_of, thermometer

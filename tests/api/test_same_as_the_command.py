@@ -11,7 +11,7 @@ import pytest
 import pulsetrainer as pt
 from program import pulsetrainer
 from pulsetrainer.cli.console import plain
-from pulsetrainer.diagnosis.causes.base import low_pass
+from pulsetrainer.diagnosis.causes.frame import low_pass
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.check import updated
 

@@ -21,7 +21,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import Question, State

@@ -15,7 +15,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import congruency
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for

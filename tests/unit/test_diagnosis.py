@@ -15,7 +15,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import experiment, fitting, raw, residual
 from pulsetrainer.diagnosis.causes import cause_named, fired_on, library
-from pulsetrainer.diagnosis.causes.base import Frame, low_pass
+from pulsetrainer.diagnosis.causes.frame import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for

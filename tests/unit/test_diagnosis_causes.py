@@ -18,7 +18,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
 from pulsetrainer.diagnosis.causes import condition_change, fired_on, library, outliers, rate_widening
-from pulsetrainer.diagnosis.causes.base import Frame, Past, low_pass, settled
+from pulsetrainer.diagnosis.causes.frame import Frame, Past, low_pass, settled
 from pulsetrainer.diagnosis.causes.step import _split
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing

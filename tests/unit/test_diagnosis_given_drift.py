@@ -14,7 +14,7 @@ import pulsetrainer as pt
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis import given_drift, wording
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.given_drift import drift_in
 

@@ -28,7 +28,7 @@ from pulsetrainer.diagnosis import (
     wording,
 )
 from pulsetrainer.diagnosis.causes import library, stick_slip
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.dependence import Bank
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.evidence import Evidence

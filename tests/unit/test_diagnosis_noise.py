@@ -13,7 +13,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.causes.outliers import _beyond_the_tail
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.noise import Noise, _edges, burstiness, noise_in, quiet_square

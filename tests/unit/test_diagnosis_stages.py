@@ -14,7 +14,7 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import artefact, design, fitting, lines, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence

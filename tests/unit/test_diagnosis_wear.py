@@ -10,7 +10,7 @@ import pytest
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import wear
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for

@@ -20,7 +20,7 @@ from pulsetrainer.core.initial_state import (
     second_stroke,
 )
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.stages import first_stroke
 

@@ -19,7 +19,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import dependence, learned
-from pulsetrainer.diagnosis.causes.base import Frame, Past
+from pulsetrainer.diagnosis.causes.frame import Frame, Past
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
 from pulsetrainer.diagnosis.fitting import weights_for

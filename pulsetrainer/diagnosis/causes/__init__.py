@@ -11,7 +11,8 @@ from functools import cache
 
 from pulsetrainer.artefacts import Cause as Found
 from pulsetrainer.artefacts import Extension
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.errors import DataError
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = 0.05  # amplitude
 _TRIED_PATHS = (7.0, 20.0, 60.0)  # ranges of the input: some loops, dozens, a whole record

@@ -10,17 +10,17 @@ a step treats that cause in its own way.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import wild
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 if TYPE_CHECKING:
@@ -28,18 +28,7 @@ if TYPE_CHECKING:
     from pulsetrainer.diagnosis.fitting import Fitted
     from pulsetrainer.diagnosis.floor import Floor
 
-_NO_LAG = 1e-7  # of a time step: a shorter time constant is none
-_WITHIN_STROKE = (0.02, 0.5)  # ranges that the input moves in a time: a level of the plane; a long stroke
-_NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
-_NEAR = 0.02  # of a record: a change of rate so near to a moment is at that moment ...
-_SIDE = 0.05  # ... if on so much of the record before and after it ...
-_MOVES = 0.2  # ... of which the input moves in this share at least ...
-_FASTER = 1.5  # ... it moves so many times as fast; ...
-_LOOKS = 20  # ... looked for at so many places to either side
 _LEVELS = 48  # of a hysteresis that fills in what the readings leave open
-_UNEVEN = 0.75  # of a time step: two columns may be read half a step apart, and an input be held besides
-STEPPED = 30.0  # time steps: to a longer lag it does not matter what is between two samples ...
-_BETWEEN = (0.7, -0.7)  # ... and what is tried for a shorter one: nearly the later sample, nearly the earlier
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
@@ -61,108 +50,6 @@ class Quantity:
     small: float  # a step that matters little: for differences
     meaning: str = ""  # what it is, in words; {input} and {output} are what was measured
     whole: bool = False  # nothing lies beyond its bounds: an end of them is an answer like any other
-
-
-@dataclass
-class Past:
-    """What the causes of a chain remember, by name: of the piece before, and as it is after this one.
-
-    A chain that feeds its output back passes a piece several times: each time from ``before``, and the last
-    time counts.
-    """
-
-    before: dict[str, FloatArray] = field(default_factory=dict)
-    after: dict[str, FloatArray] = field(default_factory=dict)
-
-    def next(self) -> Past:
-        """Return what the piece that follows begins with."""
-        return Past(before={**self.before, **self.after})
-
-
-@dataclass(frozen=True)
-class Frame:
-    """What a cause may know of a record besides the signal that passes it."""
-
-    dt_s: float
-    input: FloatArray  # (n,) measured input
-    span: float  # of the output, output unit
-    reach: float  # range of the input, input unit
-    record: int = 0  # which record of how many
-    records: int = 1
-    low: float = 0.0  # end of the input's range
-    ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
-    zero: float = 0.0  # output of the hysteresis where its memory is empty: gains are about it
-    begin_s: float = 0.0  # since the first record began, as if they had been made one after another
-    longest_s: float = 0.0  # of the records, the longest; 0: this one
-    averaged: int = 1  # samples as measured, of which each of these is the mean
-    past: Past | None = None  # what the causes remember of the piece before; None: there was none
-    kept: dict[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)  # of the input alone
-
-    @property
-    def length_s(self) -> float:
-        """Length of the longest record."""
-        return self.longest_s or self.input.size * self.dt_s
-
-    @property
-    def time_s(self) -> FloatArray:
-        """Time since the first sample (n,)."""
-        return np.asarray(np.arange(self.input.size) * self.dt_s, dtype=np.float64)
-
-    @cached_property
-    def path(self) -> FloatArray:
-        """Length of the input's path at each sample (n,), wiggles of noise left out."""
-        before = self.remembered("path", self.input[:1])
-        turned = settled(self.input, _NO_PATH * self.reach, float(before[0]))
-        self.remember("path", turned[-1:])
-        return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
-
-    def is_within_stroke(self, time_s: float) -> bool:
-        """Whether the input moves, on average, by more than a level in such a time, but within one stroke."""
-        ranges = float(self.path[-1]) / self.reach * time_s / (self.input.size * self.dt_s)
-        return _WITHIN_STROKE[0] < ranges < _WITHIN_STROKE[1]
-
-    def changes_rate(self, time_s: float) -> bool:
-        """Whether the input moves at another speed after a time since its first sample than before it."""
-        count, near = self.input.size, round(_NEAR * self.input.size)
-        at, side = round(time_s / self.dt_s), round(_SIDE * self.input.size)
-        speed = np.abs(np.diff(self.input)) / self.reach
-        for turn in range(max(at - near, side), min(at + near, count - side), max(near // _LOOKS, 1)):
-            sides = [
-                part[part > _NO_PATH * self.dt_s / self.length_s]
-                for part in (speed[turn - side : turn], speed[turn : turn + side])
-            ]
-            if all(part.size >= _MOVES * side for part in sides):
-                one, other = (float(np.median(part)) for part in sides)
-                if max(one, other) > _FASTER * min(one, other):
-                    return True
-        return False
-
-    def about(self, zero: float) -> Frame:
-        """Return the frame with another zero of the output; the path is followed once for all of them."""
-        one = replace(self, zero=zero)
-        one.__dict__["path"] = self.path
-        return one
-
-    @property
-    def is_first(self) -> bool:
-        """Whether nothing is remembered of a piece before."""
-        return self.past is None or not self.past.before
-
-    def remembered(self, name: str, at_first: FloatArray) -> FloatArray:
-        """Return what the piece before kept under a name; ``at_first`` where there was none."""
-        return at_first if self.past is None else self.past.before.get(name, at_first)
-
-    def remember(self, name: str, values: FloatArray) -> None:
-        """Keep something for the piece that follows."""
-        if self.past is not None:
-            self.past.after[name] = values
-
-    def low_pass(self, x: FloatArray, tau_s: float, name: str, between: float = 0.0) -> FloatArray:
-        """Return x (n,) behind a lag, going on from where the piece before, of the same name, ended."""
-        last = self.remembered(f"lag {name}", np.repeat(x[:1], 2))
-        filtered = low_pass(x, tau_s, self.dt_s, last, between)
-        self.remember(f"lag {name}", np.asarray([x[-1], filtered[-1]]))
-        return filtered
 
 
 @dataclass(frozen=True)
@@ -344,91 +231,12 @@ class Cause:
         return u
 
     def alternatives(self) -> tuple[Cause, ...]:
-        """Return causes of the same parameters whose formulas are as plausible as its own: for intervals."""
+        """Return causes of the same parameters that are as plausible: for intervals, as ``variants`` are."""
         return ()
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
         return []
-
-
-class OneTime(Cause):
-    """A cause with one time constant or delay, before or after the output."""
-
-    family = "lag"
-    _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
-
-    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        return sampled(self.parameters, frame)
-
-    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try, none shorter than a time step."""
-        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
-
-
-class Late(OneTime):
-    """A cause by which the output is late."""
-
-    scales = True
-    widens = True
-    common = True
-
-
-class FirstOrder(Late):
-    """A first-order lag; what it sees between two samples is a parameter of the finer formula.
-
-    A table does not say whether an amplifier held the input or ramped it. To a lag of few time steps that is
-    half a step, which would be taken for another cause, such as a force by speed (decision 148).
-    """
-
-    parameters = (
-        Quantity("tau", "s", 0.0, 0.5, 0.0005),
-        Quantity(
-            "between",
-            "1",
-            -1.0,
-            1.0,
-            0.02,
-            "what it sees between two samples: 0 a straight line, 1 the later sample, -1 the earlier one",
-            whole=True,
-        ),
-    )
-
-    def __init__(self, *, is_finer: bool = False) -> None:
-        self._is_finer = is_finer
-
-    def as_fine_as(self, other: FirstOrder) -> FirstOrder:
-        """Return the same with as many parameters as another has."""
-        return type(self)(is_finer=other._is_finer)
-
-    def coarser(self) -> Cause | None:
-        return type(self)() if self._is_finer else None
-
-    def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
-        if self._is_finer or frame.averaged > 1 or values[0] > STEPPED * frame.dt_s:
-            return []
-        return [(type(self)(is_finer=True), between) for between in _BETWEEN]
-
-    def restored(self, values: Values) -> tuple[Cause, Values]:
-        return type(self)(is_finer=len(values) > 1), values
-
-    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        time, between = self.parameters
-        return (*sampled((time,), frame), *([between] if self._is_finer else []))
-
-
-class RecordedLate(OneTime):
-    """A fault by which the input is recorded late: no device answers before it is asked."""
-
-    lasting = False
-    corrects = True
-    comes_before = True
-    excitation = "reversals at three rates or more, spanning ten to one, with stops"
-    source = "Ljung, System Identification, 1999, section 14.1"
-
-    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
-        """Return whether it is late by more than the moments of sampling may be."""
-        return any(values[0] >= _UNEVEN * frame.dt_s / frame.averaged for frame in frames)
 
 
 class OfTheRecord(Cause):
@@ -475,36 +283,3 @@ def spread(low: float, high: float, ratio: float) -> list[float]:
         return [high]
     count = round(np.log(high / low) / np.log(ratio)) + 1
     return [float(one) for one in np.geomspace(low, high, count)]
-
-
-def low_pass(
-    x: FloatArray, tau_s: float, dt_s: float, last: FloatArray | None = None, between: float = 0.0
-) -> FloatArray:
-    """Solve tau x' + x = input for an input that is straight between samples, from rest at x[0].
-
-    ``last`` (2,) is the last input and output before, where it does not begin at rest. ``between`` is what
-    the input is between two samples: 0 straight, 1 the later one, -1 the earlier one.
-
-    Exact: y+ = a y + (1 - a) u + b (u+ - u) with a = exp(-dt/tau) and b = 1 - (tau/dt)(1 - a) of a straight
-    input, 1 - a of one that is the later sample, 0 of one that is the earlier one.
-    """
-    if tau_s <= _NO_LAG * dt_s:
-        return x
-    a = np.exp(-dt_s / tau_s)
-    slope = 1.0 - tau_s / dt_s * (1.0 - a)
-    slope += max(between, 0.0) * (1.0 - a - slope) + min(between, 0.0) * slope
-    b = np.asarray([slope, 1.0 - a - slope])
-    # the filter's first step must see the first value as its past
-    last_in, last_out = np.repeat(x[:1], 2) if last is None else last
-    state = scipy.signal.lfiltic(b, np.asarray([1.0, -a]), y=[last_out], x=[last_in])
-    return np.asarray(scipy.signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)[0])
-
-
-def settled(values: FloatArray, width: float, at: float | None = None) -> FloatArray:
-    """Path (n,) of a point dragged by ``values`` with play ``width``: wiggles smaller than it are no path."""
-    at = float(values[0]) if at is None else at
-    path = []
-    for value in values.tolist():
-        at = min(max(at, value - width), value + width)
-        path.append(at)
-    return np.asarray(path)

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = (1e-5, 1e-4)  # the errors of a good and of a bad crystal
 _SLIP = 1.0  # time steps over the longest record: its mean, half a step, may be due to moments of sampling

@@ -18,7 +18,8 @@ import numpy as np
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.evidence import sentences
 
 if TYPE_CHECKING:

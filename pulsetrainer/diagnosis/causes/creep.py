@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, spread
+from pulsetrainer.diagnosis.causes.base import OfKinds, Quantity, Values, spread
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = 0.03  # amplitude
 _FASTEST_S = 0.1  # the fastest middle time constant

@@ -12,7 +12,9 @@ import math
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import Late
 
 
 class Delay(Late):

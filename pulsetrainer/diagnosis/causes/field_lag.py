@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import FirstOrder, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import BETWEEN, FirstOrder
 
 
 class FieldLag(FirstOrder):
@@ -19,7 +21,7 @@ class FieldLag(FirstOrder):
     order = 20
     parameters = (
         Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),
-        *FirstOrder.parameters[1:],
+        BETWEEN,
     )
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:

@@ -11,7 +11,9 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, RecordedLate, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import RecordedLate
 
 _NOISE = 1e-3  # of the range: slopes are taken over as many samples as leave less of it than that
 _WINDOW = 0.5  # of the time constant: over no more than that

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, Quantity, RecordedLate, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import RecordedLate
 
 
 class LateInput(RecordedLate):

@@ -15,7 +15,8 @@ import numpy as np
 
 from pulsetrainer.core import wild
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values, spread
+from pulsetrainer.diagnosis.causes.frame import Frame, low_pass
 
 _FASTEST = 0.5  # 1/s: the fastest leak that is tried
 _SLOWEST = 0.3  # over a record: of the output that is held, as much is gone in the slowest one

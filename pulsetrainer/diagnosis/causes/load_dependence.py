@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = 0.01  # of the range over the span
 _LEAST = 0.2  # of the range: a feedback that leaves less of it is not allowed

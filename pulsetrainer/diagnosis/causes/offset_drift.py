@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.thresholds import TINY
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import FirstOrder, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
+from pulsetrainer.diagnosis.causes.late import BETWEEN, FirstOrder
 
 
 class OutputLag(FirstOrder):
@@ -24,7 +26,7 @@ class OutputLag(FirstOrder):
     in_rows = True
     parameters = (
         Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),
-        *FirstOrder.parameters[1:],
+        BETWEEN,
     )
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:

@@ -10,7 +10,8 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.evidence import sentences
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 

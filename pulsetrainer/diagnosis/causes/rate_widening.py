@@ -8,7 +8,8 @@ from math import atan, tan, tanh
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = (0.005, 0.015)  # of the root of the range: coefficients tried
 _NONE = 3e-8  # of the root of range and time step: a smaller coefficient widens nothing

@@ -10,7 +10,8 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED_Hz = (3.0, 80.0, 20)  # frequencies: from, to, how many
 _TRIED_DAMPING = (0.07, 0.25)  # one that rings for long, and one that rings shortly

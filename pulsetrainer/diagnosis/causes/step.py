@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Taken, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 from pulsetrainer.diagnosis.evidence import sentences
 
 if TYPE_CHECKING:

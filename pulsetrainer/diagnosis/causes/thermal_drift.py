@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, spread
+from pulsetrainer.diagnosis.causes.base import Cause, OfKinds, Quantity, Values, spread
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 _TRIED = 0.02  # coefficient
 _FASTEST_S = 5.0  # that of a wire: anything faster is creep

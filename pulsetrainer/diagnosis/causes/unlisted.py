@@ -15,7 +15,8 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity, Values
+from pulsetrainer.diagnosis.causes.frame import Frame
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.finding import Estimate

@@ -14,16 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import (
-    STEPPED,
-    Cause,
-    Frame,
-    OfKinds,
-    Quantity,
-    Values,
-    low_pass,
-    sampled,
-)
+from pulsetrainer.diagnosis.causes.base import Cause, OfKinds, Quantity, Values, sampled
+from pulsetrainer.diagnosis.causes.frame import Frame, low_pass
 
 _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
@@ -84,7 +76,7 @@ class Viscous(OfKinds):
         return Viscous(self.kind) if self._is_finer else None
 
     def finer(self, frame: Frame, values: Values) -> list[tuple[Cause, float]]:
-        if self._is_finer or frame.averaged > 1 or values[1] > STEPPED * frame.dt_s:
+        if self._is_finer or not frame.shows_between(values[1]):
             return []
         return [(Viscous(self.kind, is_finer=True), _AROUND)]
 

@@ -21,10 +21,9 @@ from dataclasses import replace
 from itertools import product
 
 from pulsetrainer.diagnosis.causes import library, other_kinds
-from pulsetrainer.diagnosis.causes.base import Cause, FirstOrder
+from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.causes.creep import Creep
 from pulsetrainer.diagnosis.causes.resonance import Resonance
-from pulsetrainer.diagnosis.causes.viscous import Viscous
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fast_causes import as_late, fast_s
 from pulsetrainer.diagnosis.finding import Estimate, may_be_nothing
@@ -39,7 +38,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with each cause exchanged for a better one of its family, where there is one."""
-    state = _one_lag(_one_creep(state))
+    state = _one_for_two(_one_creep(state))
     for cause in [term.cause for term in state.current.terms]:
         state = _exchanged(state, cause)
     for term in state.current.terms:
@@ -57,11 +56,7 @@ def _refined(state: State, term: Term) -> State:
         term = Term(coarser, term.values[:-1])
         plain, trials = refit(problem, (*others, term), current), [current]
     if coarser is None or coarser.id != old.id:
-        begun = [
-            Term(one, (*term.values, value))
-            for one, value in term.cause.finer(problem.frames[0], term.values)
-        ]
-        trials += [refit(problem, (*others, one), current) for one in begun]
+        trials += [refit(problem, (*others, one), current) for one in _finer(state, term)]
     shown = [fine for fine in trials if _shows(state, fine, plain, _in_place_of(old, fine, current))]
     best = min(shown, key=lambda fitted: fitted.squares, default=plain)
     return state if best is current else _with(state, best, old)
@@ -117,7 +112,7 @@ def _one_creep(state: State) -> State:
     return replace(state, current=settled(state.problem, best), p_values=p_values)
 
 
-def _one_lag(state: State) -> State:
+def _one_for_two(state: State) -> State:
     """Return the state with one cause for two, where what it sees between two samples explains the other.
 
     The other is as fast as the samples, such as a force by speed, or rings. The one must do as well alone.
@@ -126,10 +121,9 @@ def _one_lag(state: State) -> State:
     fast = [t for t in current.terms if fast_s(t, frame) is not None or isinstance(t.cause, Resonance)]
     as_good = []
     for term, other in product(current.terms, fast):
-        if other is term or not isinstance(term.cause, FirstOrder | Viscous):
-            continue
         kept = tuple(one for one in current.terms if one not in (term, other))
-        for fine in _finer(state, term):
+        between = [one for one in _finer(state, term) if one.cause.quantities(frame)[-1].whole]
+        for fine in between if other is not term else []:
             trial = refit(state.problem, (*kept, fine), current)
             if trial.squares - current.squares > doubt(current, trial, noise):
                 continue

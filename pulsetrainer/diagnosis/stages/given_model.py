@@ -50,8 +50,8 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import given_drift, velocity
 from pulsetrainer.diagnosis.causes import condition_change, library
-from pulsetrainer.diagnosis.causes.base import settled
 from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, follows, left_by
+from pulsetrainer.diagnosis.causes.frame import settled
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
